@@ -1,0 +1,1 @@
+//! Outdoor landscapes for wgpu.
