@@ -1,1 +1,3 @@
 //! The composer.
+
+pub mod diag;
