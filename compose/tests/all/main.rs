@@ -1,3 +1,3 @@
 //! All tests of the composer in one binary.
 
-mod readers;
+mod link;
