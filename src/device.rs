@@ -110,3 +110,18 @@ impl Gpu {
         Ok(data)
     }
 }
+
+#[cfg(feature = "compose")]
+static SHARED: std::sync::OnceLock<Result<Gpu, Error>> = std::sync::OnceLock::new();
+
+/// One device for everything in this process that needs no device of its own, opened at the first call.
+///
+/// # Errors
+/// As [`Gpu::open`]; the first answer holds for all calls.
+#[cfg(feature = "compose")]
+pub fn shared() -> Result<&'static Gpu, Error> {
+    SHARED
+        .get_or_init(|| pollster::block_on(Gpu::open()))
+        .as_ref()
+        .map_err(Clone::clone)
+}
