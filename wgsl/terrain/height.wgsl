@@ -26,6 +26,9 @@ struct Terrain {
     seed: u32,
 }
 
+// The attribute must stand between the comment and `virtual`: naga_oil 0.23 joins the line before that word with the
+// function, and a function joined to a comment is lost.
+
 /// Height of the ground above the planet's sphere; override it to plug in another terrain.
 ///
 /// domain  offset in [-1e5, 1e5] m lin
@@ -33,6 +36,7 @@ struct Terrain {
 /// range   [-1e5, 1e5] m
 /// error   2e-2 abs of reference::terrain::height
 /// source  Leitner2022 alg. 3
+@must_use
 virtual fn height(terrain: Terrain, offset: vec2<f32>, octaves: i32) -> f32 {
     return terrain.amplitude * ridged_multifractal_2d(terrain.cell, terrain.frac + offset / terrain.wavelength, octaves,
         terrain.hurst, terrain.gain, terrain.smoothness, terrain.seed);
