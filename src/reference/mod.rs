@@ -1,0 +1,1 @@
+//! The f64 twins of the module functions, written from the formulas.
