@@ -143,3 +143,16 @@ pub fn slab_single_scatter(depth: f64, albedo: f64, phase: f64, view_mu: f64, su
     let slope = 1.0 / view_mu - 1.0 / sun_mu;
     albedo * phase / view_mu * depth * (-depth / sun_mu).exp() * super::math::one_minus_exp_over_x(slope * depth)
 }
+
+/// Radiance with clouds: the air before them (`front`), their own light, and what they let through.
+pub fn composite_clouds(
+    clouds: CloudLight,
+    sun_light: [f64; 3],
+    front: super::atmosphere::SkyLight,
+    background: [f64; 3],
+) -> [f64; 3] {
+    std::array::from_fn(|k| {
+        let air = front.in_scatter[k];
+        air + front.transmittance[k] * clouds.scatter * sun_light[k] + clouds.transmittance * (background[k] - air).max(0.0)
+    })
+}

@@ -15,6 +15,10 @@ struct CloudLight {
     transmittance: f32,
     /// Mean distance of what is seen of the clouds [m]; the layer's entry where there are none.
     mean_distance: f32,
+    /// Density samples on the view ray.
+    density_samples: i32,
+    /// Density samples towards the sun.
+    light_samples: i32,
 }
 
 /// Distance from a point within the layer to the layer's edge.
@@ -93,7 +97,7 @@ fn march_clouds(layer: CloudLayer, ground_radius: f32, eye_altitude: f32, dir: v
     }
     let phase = phase_double_henyey_greenstein(nu, layer.g_forward, layer.g_backward, layer.backward_share);
     return CloudLight(scatter * layer.albedo * phase, transmittance,
-        select(segment.near, weighted / max(weight, 1e-12), weight > 1e-12));
+        select(segment.near, weighted / max(weight, 1e-12), weight > 1e-12), count, count * max(light_steps, 1));
 }
 
 /// The same light with less work: the march to the sun runs only where there is cloud and sun, and the view march ends
@@ -122,17 +126,20 @@ fn march_clouds_skip(layer: CloudLayer, ground_radius: f32, eye_altitude: f32, d
     var scatter = 0.0;
     var weight = 0.0;
     var weighted = 0.0;
+    var samples = vec2<i32>(0);
     for (var i = 0; i < count && transmittance > min_transmittance; i++) {
         let t = segment_distance(segment, (f32(i) + jitter) * ds);
         let altitude = altitude_along(ground_radius, eye_altitude, dir.y, t);
         let relative = dir * t;
         let density = cloud_density(layer, relative, altitude);
+        samples.x += 1;
         if density > 0.0 {
             let mu = direction_cosine_along(ground_radius, eye_altitude, altitude, to_sun.y, nu, t);
             let step_depth = density * layer.extinction * ds;
             let left = transmittance * exp(-step_depth);
             if ground_distance(ground_radius, altitude, mu) < 0.0 {
                 let depth = sun_depth(layer, ground_radius, relative, altitude, to_sun, mu, light_steps);
+                samples.y += max(light_steps, 1);
                 scatter += transmittance * step_depth * exp(-depth);
             }
             weight += transmittance - left;
@@ -142,5 +149,5 @@ fn march_clouds_skip(layer: CloudLayer, ground_radius: f32, eye_altitude: f32, d
     }
     let phase = phase_double_henyey_greenstein(nu, layer.g_forward, layer.g_backward, layer.backward_share);
     return CloudLight(scatter * layer.albedo * phase, transmittance,
-        select(segment.near, weighted / max(weight, 1e-12), weight > 1e-12));
+        select(segment.near, weighted / max(weight, 1e-12), weight > 1e-12), samples.x, samples.y);
 }

@@ -26,7 +26,7 @@ struct ShellSegment {
 
 /// Altitude at distance `t` along a ray.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  h in [0, 1e5] m lin
 /// domain  mu in [-1, 1] 1 lin
 /// domain  t in [0, 1e6] m lin
@@ -41,7 +41,7 @@ fn altitude_along(ground_radius: f32, h: f32, mu: f32, t: f32) -> f32 {
 
 /// Altitude of a point given relative to the eye, +Y up at the eye.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  eye_altitude in [0, 1e5] m lin
 /// domain  relative in [-5e5, 5e5] m lin
 /// range   [-1e6, 2e6] m
@@ -55,7 +55,7 @@ fn altitude_of(ground_radius: f32, eye_altitude: f32, relative: vec3<f32>) -> f3
 
 /// Unit vector away from the planet's centre at a point given relative to the eye.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  eye_altitude in [0, 1e5] m lin
 /// domain  relative in [-5e5, 5e5] m lin
 /// range   [-1, 1] 1
@@ -69,7 +69,7 @@ fn up_at(ground_radius: f32, eye_altitude: f32, relative: vec3<f32>) -> vec3<f32
 /// Zenith cosine, at distance `t` along a ray, of a fixed direction (towards the sun, say) that has the zenith cosine
 /// `direction_mu` at the ray's start and the cosine `nu` with the ray; `altitude` is the ray's altitude at `t`.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  h in [0, 1e5] m lin
 /// domain  altitude in [0, 1e5] m lin
 /// domain  direction_mu in [-1, 1] 1 lin
@@ -84,7 +84,7 @@ fn direction_cosine_along(ground_radius: f32, h: f32, altitude: f32, direction_m
 
 /// Distances at which a ray meets the sphere at altitude `level`.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  level in [0, 1e5] m lin
 /// domain  h in [0, 1e5] m lin
 /// domain  mu in [-1, 1] 1 lin
@@ -107,7 +107,7 @@ fn sphere_span(ground_radius: f32, level: f32, h: f32, mu: f32) -> Span {
 
 /// Distance from altitude `h`, along zenith cosine `mu`, to the top of the shell.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  top in [1e5, 2e5] m lin
 /// domain  h in [0, 1e5] m lin
 /// domain  mu in [-1, 1] 1 lin
@@ -123,7 +123,7 @@ fn top_distance(ground_radius: f32, top: f32, h: f32, mu: f32) -> f32 {
 
 /// Distance from altitude `h` >= 0, along zenith cosine `mu`, to the ground sphere; -1 when the ray misses it.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  h in [0, 1e5] m lin
 /// domain  mu in [-1, 1] 1 lin
 /// range   [-1, 5e6] m
@@ -140,7 +140,7 @@ fn ground_distance(ground_radius: f32, h: f32, mu: f32) -> f32 {
 /// The part of a ray between the spheres at altitudes `bottom` and `top`, from a start below, inside or above them;
 /// the ground sphere ends the ray.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  bottom in [100, 5e3] m lin
 /// domain  top in [6e3, 2e4] m lin
 /// domain  h in [0, 1e5] m lin
