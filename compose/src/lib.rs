@@ -1,3 +1,4 @@
 //! The composer.
 
 pub mod diag;
+pub mod sp;
