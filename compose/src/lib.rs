@@ -5,12 +5,10 @@ pub mod diag;
 pub mod gate;
 pub mod library;
 pub mod link;
-pub mod lint;
-pub mod reflect;
 pub mod scan;
-pub mod sp;
 
-pub use compose::{Composed, Composer, finish};
+pub use compose::finish;
 pub use diag::{Diag, Diags};
 pub use library::Library;
 pub use link::{Def, Defs, LinkInput, Linker};
+pub mod sp;
