@@ -1,1 +1,5 @@
 //! The f64 twins of the module functions, written from the formulas.
+
+pub mod fractal;
+pub mod hash;
+pub mod noise;
