@@ -3,10 +3,12 @@
 pub mod compose;
 pub mod diag;
 pub mod gate;
+pub mod keys;
 pub mod library;
 pub mod link;
 pub mod lint;
 pub mod reflect;
+mod ron_place;
 pub mod scan;
 pub mod sp;
 

@@ -102,22 +102,17 @@ impl Linker {
         if !diags.is_empty() {
             return Err(diags);
         }
-        let body = scan
-            .preprocess(input.text, input.defs)
+        let library = &self.library;
+        let (body, mut plug_ins) = scan
+            .preprocess(input.text, input.defs, &|import| library.is_plug_in(import))
             .map_err(|fault| Diag::at(input.file, input.text, fault.at, fault.message))?;
-        // naga_oil wants WGSL directives first; naga knows `enable f16` and loses all of them.
-        let mut source: String = scan
-            .heads
-            .iter()
-            .map(|head| head.text.split_whitespace().collect::<Vec<_>>().join(" ") + " ")
-            .collect();
-        source.push('\n');
-        source.push_str(&body);
+        plug_ins.extend_from_slice(input.plug_ins);
+        let source = with_heads(scan, &body);
 
         let wanted: Vec<&str> = scan
             .imports()
             .map(|import| import.module.as_str())
-            .chain(input.plug_ins.iter().map(String::as_str))
+            .chain(plug_ins.iter().map(String::as_str))
             .collect();
         self.add_modules(&wanted)?;
 
@@ -132,11 +127,10 @@ impl Linker {
                 (name.clone(), value)
             })
             .collect();
-        let additional: Vec<ImportDefinition> = input
-            .plug_ins
-            .iter()
-            .map(|module| ImportDefinition {
-                import: module.clone(),
+        let additional: Vec<ImportDefinition> = plug_ins
+            .into_iter()
+            .map(|import| ImportDefinition {
+                import,
                 items: Vec::new(),
             })
             .collect();
@@ -185,7 +179,7 @@ impl Linker {
             if !diags.is_empty() {
                 return Err(diags);
             }
-            let source = module.scan.without_comments(&module.text);
+            let source = with_heads(&module.scan, &module.scan.without_comments(&module.text));
             let (composer, file) = (&mut self.composer, module.file.clone());
             let outcome = crate::gate::no_panic(|| {
                 composer
@@ -227,10 +221,10 @@ impl Linker {
                 .modules()
                 .find(|module| top.is_none() && module.file == *path),
         };
-        let (file, original, head_lines) = match (module, top) {
-            (Some(module), _) => (module.file.as_str(), module.text.as_str(), 0),
-            (None, Some((input, _))) => (input.file, input.text, HEAD_LINES),
-            (None, None) => ("naga_oil", "", 0),
+        let (file, original) = match (module, top) {
+            (Some(module), _) => (module.file.as_str(), module.text.as_str()),
+            (None, Some((input, _))) => (input.file, input.text),
+            (None, None) => ("naga_oil", ""),
         };
         let (message, mut notes, offset) = describe(&error.inner);
         // `override fn` with another signature: naga_oil gives no place.
@@ -256,7 +250,7 @@ impl Linker {
             Place::Span(at) => (at & ((1 << 21) - 1)).saturating_sub(error.source.offset()),
             Place::Byte(at) => at,
         };
-        let (line, column) = original_place(&decorated, offset, original, head_lines);
+        let (line, column) = original_place(&decorated, offset, original);
         let mut diag = Diag::new(file, line, column, line_at(original, line), message);
         diag.notes = notes;
         diag
@@ -282,6 +276,25 @@ impl Linker {
         });
         overriding.unwrap_or_else(|| Diag::whole_file(input.file, message))
     }
+}
+
+/// A text as naga_oil wants it: one line with `enable` directives, then the rest. The other directives mean nothing to
+/// naga's IR; the composer puts them before what it writes.
+fn with_heads(scan: &Scan, body: &str) -> String {
+    let names: BTreeSet<&str> = scan
+        .heads
+        .iter()
+        .filter(|head| head.word == "enable")
+        .flat_map(|head| head.names.iter().map(|(name, _)| name.as_str()))
+        .collect();
+    let mut source = String::with_capacity(body.len() + 16);
+    if !names.is_empty() {
+        let names: Vec<&str> = names.into_iter().collect();
+        source.push_str(&format!("enable {};", names.join(", ")));
+    }
+    source.push('\n');
+    source.push_str(body);
+    source
 }
 
 /// The panic of a front end as a diagnostic.
@@ -380,7 +393,7 @@ fn describe(error: &ComposerErrorInner) -> (String, Vec<String>, Option<Place>) 
 
 /// Line and column in the original text of a byte in the text that naga_oil made of it. The lines are the same; within
 /// the line the n-th token is the same, however long the linker made it.
-fn original_place(decorated: &str, offset: usize, original: &str, head_lines: usize) -> (u32, u32) {
+fn original_place(decorated: &str, offset: usize, original: &str) -> (u32, u32) {
     let mut offset = offset.min(decorated.len());
     while !decorated.is_char_boundary(offset) {
         offset -= 1;
@@ -389,7 +402,7 @@ fn original_place(decorated: &str, offset: usize, original: &str, head_lines: us
     let start = decorated[..offset].rfind('\n').map_or(0, |n| n + 1);
     let decorated_line = decorated[start..].split('\n').next().unwrap_or("");
     let within = offset - start;
-    let number = (line + 1).saturating_sub(head_lines).max(1) as u32;
+    let number = (line + 1).saturating_sub(HEAD_LINES).max(1) as u32;
     let original_line = line_at(original, number);
 
     let before = line_tokens(decorated_line);

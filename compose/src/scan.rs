@@ -926,18 +926,24 @@ impl Scan {
             .join("\n")
     }
 
-    /// The text with its comments blanked and its line breaks made `\n`: same lines, same columns.
+    /// The text with its comments and WGSL directives blanked and its line breaks made `\n`: same lines, same columns.
     pub fn without_comments(&self, text: &str) -> String {
         let mut out = String::with_capacity(text.len() + 1);
         let mut at = 0;
-        for &(start, end) in &self.comments {
-            push_normalized(&mut out, &text[at..start]);
+        let mut blanks: Vec<(usize, usize)> = self.comments.clone();
+        blanks.extend(self.heads.iter().map(|head| (head.start, head.end)));
+        blanks.sort_unstable();
+        for (start, end) in blanks {
+            if start < at {
+                continue;
+            }
+            out.push_str(&text[at..start]);
             for c in text[start..end].chars() {
                 out.push(if c == '\n' || c == '\r' { c } else { ' ' });
             }
             at = end;
         }
-        push_normalized(&mut out, &text[at..]);
+        out.push_str(&text[at..]);
         let mut out = out.replace("\r\n", "\n").replace('\r', "\n");
         if !out.ends_with('\n') {
             out.push('\n');
@@ -946,11 +952,18 @@ impl Scan {
     }
 
     /// The text for a given set of values: comments, conditions and what is switched off blanked, sizes inserted, WGSL
-    /// directives blanked. The lines stay; a size may shift the columns after it.
+    /// directives blanked. The lines stay; a size may shift the columns after it. Imports for which `is_plug_in` holds are
+    /// blanked too, and those that are active are returned by their paths.
     ///
     /// # Errors
     /// A size without a value, in an active place.
-    pub fn preprocess(&self, text: &str, defs: &Defs) -> Result<String, Fault> {
+    pub fn preprocess(
+        &self,
+        text: &str,
+        defs: &Defs,
+        is_plug_in: &dyn Fn(&Import) -> bool,
+    ) -> Result<(String, Vec<String>), Fault> {
+        let mut plug_ins = Vec::new();
         // Ranges to blank or to replace, in the order of the text.
         let mut edits: Vec<(usize, usize, Option<String>)> = self
             .comments
@@ -994,7 +1007,14 @@ impl Scan {
                     stack.pop();
                     edits.push((directive.start, directive.end, None));
                 }
-                DirectiveKind::Import(_) => {}
+                DirectiveKind::Import(imports) => {
+                    if imports.iter().any(is_plug_in) {
+                        edits.push((directive.start, directive.end, None));
+                        if outer {
+                            plug_ins.extend(imports.iter().map(Import::path));
+                        }
+                    }
+                }
                 DirectiveKind::ImportPath { .. } | DirectiveKind::Faulty => {
                     edits.push((directive.start, directive.end, None));
                 }
@@ -1052,7 +1072,7 @@ impl Scan {
             if start < at {
                 continue;
             }
-            push_normalized(&mut out, &text[at..start]);
+            out.push_str(&text[at..start]);
             match with {
                 Some(with) => out.push_str(&with),
                 None => {
@@ -1063,12 +1083,12 @@ impl Scan {
             }
             at = end;
         }
-        push_normalized(&mut out, &text[at..]);
+        out.push_str(&text[at..]);
         let mut out = out.replace("\r\n", "\n").replace('\r', "\n");
         if !out.ends_with('\n') {
             out.push('\n');
         }
-        Ok(out)
+        Ok((out, plug_ins))
     }
 }
 
@@ -1095,10 +1115,6 @@ impl Test {
             }
         }
     }
-}
-
-fn push_normalized(out: &mut String, text: &str) {
-    out.push_str(text);
 }
 
 /// The name in `#{NAME}`.
