@@ -1,4 +1,7 @@
 //! The composer.
 
 pub mod diag;
+pub mod keys;
+pub mod ron_place;
+pub mod settings;
 pub mod sp;
