@@ -107,7 +107,20 @@ impl SourceStage {
         }
     }
 
-    fn gate_diag(&self, fault: &GateFault) -> Diag {
+    /// A gate's fault at the declaration of its item, which may be in a module.
+    fn gate_diag(&self, fault: &GateFault, library: &Library) -> Diag {
+        let here = |name: &str| self.scan.items.iter().any(|item| item.name == name);
+        if let Some(name) = &fault.item
+            && !here(name)
+        {
+            let reached =
+                library.reached(self.scan.imports().map(|import| import.module.as_str()));
+            for module in reached {
+                if let Some(item) = module.item(name) {
+                    return module.diag(item.at, fault.message.clone());
+                }
+            }
+        }
         self.diag_of(fault.item.as_deref(), &fault.message)
     }
 }
@@ -426,7 +439,7 @@ impl Composer {
         &mut self,
         sp: &SpFile,
         features: &BTreeSet<String>,
-        sizes: &BTreeMap<String, i32>,
+        sizes: &BTreeMap<String, i64>,
     ) -> Result<Composed, Diags> {
         let program = self.prepare(sp)?;
         self.compose_prepared(&program, features, sizes)
@@ -440,7 +453,7 @@ impl Composer {
         &mut self,
         program: &Program,
         features: &BTreeSet<String>,
-        sizes: &BTreeMap<String, i32>,
+        sizes: &BTreeMap<String, i64>,
     ) -> Result<Composed, Diags> {
         let mut diags = Diags::new();
         for feature in features {
@@ -469,12 +482,19 @@ impl Composer {
             }
             let value = sizes.get(name).copied().or_else(|| {
                 match self.keys.get(name).map(|key| key.default) {
-                    Some(Value::Int(value)) => i32::try_from(value).ok(),
+                    Some(Value::Int(value)) => Some(value),
                     _ => None,
                 }
             });
-            if let Some(value) = value {
-                defs.insert(name.clone(), Def::Int(value));
+            match value.map(i32::try_from) {
+                None => {}
+                Some(Ok(value)) => {
+                    defs.insert(name.clone(), Def::Int(value));
+                }
+                Some(Err(_)) => diags.push(Diag::whole_file(
+                    &program.file,
+                    format!("size `{name}` does not fit 32 bits"),
+                )),
             }
         }
         let mut done: Vec<(&SourceStage, Rc<DoneStage>)> = Vec::new();
@@ -494,7 +514,7 @@ impl Composer {
                 (module(StageKind::Vertex), module(StageKind::Fragment))
             {
                 for fault in gate::check_interface(&vertex.module, &fragment.module) {
-                    diags.push(stage.gate_diag(&fault));
+                    diags.push(stage.gate_diag(&fault, self.linker.library()));
                 }
             }
         }
@@ -587,6 +607,14 @@ impl Composer {
                         .collect(),
                 )
             })?;
+        if let Some(item) = reflect::computed_default(&module) {
+            return Err(stage
+                .diag_of(
+                    Some(&item),
+                    &format!("the default of override `{item}` must be a number, not an expression"),
+                )
+                .into());
+        }
         let capabilities = self.linker.capabilities();
         let mut finished = gate::no_panic(|| finish(module, capabilities))
             .unwrap_or_else(|panic| Err(format!("the WGSL writer panicked: {panic}")))
@@ -624,7 +652,7 @@ impl Composer {
         }
         if !self.passed.contains(&finished.wgsl) {
             for fault in gate::check(&finished.wgsl, &finished.module, capabilities) {
-                push_new(&mut diags, stage.gate_diag(&fault));
+                push_new(&mut diags, stage.gate_diag(&fault, self.linker.library()));
             }
             if diags.is_empty() {
                 self.passed.insert(finished.wgsl.clone());

@@ -266,7 +266,12 @@ pub fn check(wgsl: &str, written_from: &Module, capabilities: Capabilities) -> V
         }
     };
     let (module, info) = &processed;
+    faults.extend(partial_pointers(written_from));
+    let pointers = !faults.is_empty();
     for target in [Target::Spirv, Target::Hlsl51, Target::Hlsl, Target::Msl] {
+        if pointers && target == Target::Spirv {
+            continue;
+        }
         let name = target.name();
         match no_panic(|| write(module, info, target)) {
             Ok(Ok(_)) => {}
@@ -279,6 +284,76 @@ pub fn check(wgsl: &str, written_from: &Module, capabilities: Capabilities) -> V
         }
     }
     limits(module, info, &mut faults);
+    faults
+}
+
+/// Calls that pass a pointer to a part of a variable: naga validates them, and then its SPIR-V writer panics. The faults
+/// concern the calling functions.
+pub fn partial_pointers(module: &Module) -> Vec<GateFault> {
+    fn calls(block: &naga::Block, found: &mut dyn FnMut(&naga::Statement)) {
+        for statement in block {
+            match statement {
+                naga::Statement::Block(inner) => calls(inner, found),
+                naga::Statement::If { accept, reject, .. } => {
+                    calls(accept, found);
+                    calls(reject, found);
+                }
+                naga::Statement::Switch { cases, .. } => {
+                    for case in cases {
+                        calls(&case.body, found);
+                    }
+                }
+                naga::Statement::Loop {
+                    body, continuing, ..
+                } => {
+                    calls(body, found);
+                    calls(continuing, found);
+                }
+                other => found(other),
+            }
+        }
+    }
+    let mut faults = Vec::new();
+    let functions = module
+        .functions
+        .iter()
+        .map(|(_, function)| (function.name.as_deref().unwrap_or_default(), function));
+    let entries = module
+        .entry_points
+        .iter()
+        .map(|entry| (entry.name.as_str(), &entry.function));
+    for (name, function) in functions.chain(entries) {
+        calls(&function.body, &mut |statement| {
+            let naga::Statement::Call {
+                function: callee,
+                arguments,
+                ..
+            } = statement
+            else {
+                return;
+            };
+            let callee = &module.functions[*callee];
+            for (argument, parameter) in arguments.iter().zip(&callee.arguments) {
+                let pointer = matches!(
+                    module.types[parameter.ty].inner,
+                    TypeInner::Pointer { .. } | TypeInner::ValuePointer { .. }
+                );
+                let part = matches!(
+                    function.expressions[*argument],
+                    naga::Expression::Access { .. } | naga::Expression::AccessIndex { .. }
+                );
+                if pointer && part {
+                    let callee = crate::link::demangle(callee.name.as_deref().unwrap_or_default());
+                    faults.push(GateFault::of(
+                        name,
+                        format!(
+                            "`{name}` passes a pointer to a part of a variable to `{callee}`, on which naga's SPIR-V writer fails"
+                        ),
+                    ));
+                }
+            }
+        });
+    }
     faults
 }
 

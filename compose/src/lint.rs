@@ -148,17 +148,16 @@ fn imports(text: &str, scan: &Scan, library: &Library, faults: &mut Vec<Fault>) 
                 note(
                     found,
                     format!(
-                        "here from `{}`, before from `{}`: rename one by `as`",
-                        import.module, first.module
+                        "here it is `{}`, before it was `{}`: rename one by `as`",
+                        import.path(),
+                        first.path()
                     ),
                 )
             });
             continue;
         }
-        if library
-            .get(&import.path())
-            .is_some_and(Module::overrides_functions)
-        {
+        let plug_in = library.is_plug_in(import);
+        if plug_in || library.check_import("", text, import).is_some() {
             continue;
         }
         match uses.get(import.local.as_str()) {
@@ -240,6 +239,12 @@ fn heads(what: Text<'_>, scan: &Scan, capabilities: Capabilities, faults: &mut V
                 format!("`{}` must come before every declaration", head.word),
             ));
         }
+        if head.conditional {
+            faults.push(fault(
+                head.start,
+                format!("`{}` must not depend on a condition", head.word),
+            ));
+        }
         match head.word {
             "enable" => {
                 for (name, at) in &head.names {
@@ -267,6 +272,16 @@ fn heads(what: Text<'_>, scan: &Scan, capabilities: Capabilities, faults: &mut V
                 head.start,
                 format!("`{}` belongs in a program, not in a module", head.word),
             )),
+            "requires" => {
+                if naga::front::wgsl::parse_str(&head.text).is_err() {
+                    let names: Vec<&str> =
+                        head.names.iter().map(|(name, _)| name.as_str()).collect();
+                    faults.push(fault(
+                        head.start,
+                        format!("naga 30 does not know {}", quoted(&names)),
+                    ));
+                }
+            }
             "diagnostic" => {
                 const SEVERITIES: [&str; 4] = ["off", "info", "warning", "error"];
                 match head.names.first() {
@@ -442,6 +457,7 @@ fn tokens(what: Text<'_>, text: &str, scan: &Scan, faults: &mut Vec<Fault>) {
         .collect();
     for (i, token) in scan.tokens.iter().enumerate() {
         match (token.kind, word(i)) {
+            (Kind::Punct, "::") if i >= 2 && word(i - 2) == "::" => {}
             (Kind::Punct, "::") => faults.push(note(
                 fault(token.start, "a path with `::` outside an import"),
                 "import the item and use its name",
@@ -484,17 +500,16 @@ fn tokens(what: Text<'_>, text: &str, scan: &Scan, faults: &mut Vec<Fault>) {
                 _ => {}
             },
             (Kind::Punct, "&") => {
-                // A unary `&`: what stands before it is no operand.
-                let before = i.checked_sub(1).map_or("", word);
-                let unary = matches!(
-                    before,
-                    "(" | "," | "=" | "{" | ";" | "return" | "&" | "&&" | "" | "*"
-                );
-                if unary && let Some(open) = element(scan, text, i + 1) {
-                    let _ = open;
+                if let Some(callee) = callee(scan, text, i)
+                    && !naga::keywords::wgsl::BUILTIN_IDENTIFIERS.contains(&callee)
+                    && is_part(scan, text, i + 1)
+                {
                     faults.push(note(
-                        fault(token.start, "a pointer to an element of an array cannot be composed"),
-                        "naga's SPIR-V writer fails on it: pass the element's value, or the whole variable with an index",
+                        fault(
+                            token.start,
+                            format!("a pointer to a part of a variable cannot be passed to `{callee}`"),
+                        ),
+                        "naga's SPIR-V writer fails on it: pass the value, or a pointer to the whole variable",
                     ));
                 }
             }
@@ -509,33 +524,55 @@ fn tokens(what: Text<'_>, text: &str, scan: &Scan, faults: &mut Vec<Fault>) {
     let _ = what;
 }
 
-/// The `[` of the place that starts at token `i`, if it indexes something: `a[1]`, `(a)[1]`, `s.a[1]`.
-fn element(scan: &Scan, text: &str, mut i: usize) -> Option<usize> {
+/// The function in whose argument list the unary `&` at token `at` starts an argument.
+fn callee<'a>(scan: &Scan, text: &'a str, at: usize) -> Option<&'a str> {
+    let word = |i: usize| -> &'a str {
+        scan.tokens
+            .get(i)
+            .map_or("", |token| &text[token.start..token.end])
+    };
+    if !matches!(word(at.checked_sub(1)?), "(" | ",") {
+        return None;
+    }
+    let mut depth = 0;
+    let mut i = at - 1;
+    loop {
+        match word(i) {
+            ")" | "]" => depth += 1,
+            "[" => depth -= 1,
+            "(" if depth == 0 => {
+                let before = scan.tokens.get(i.checked_sub(1)?)?;
+                return (before.kind == Kind::Ident)
+                    .then(|| &text[before.start..before.end])
+                    .filter(|name| !matches!(*name, "return" | "if" | "while" | "switch" | "for"));
+            }
+            "(" => depth -= 1,
+            ";" | "{" | "}" => return None,
+            _ => {}
+        }
+        i = i.checked_sub(1)?;
+    }
+}
+
+/// Whether the place that starts at token `i` is a part of a variable: `a[1]`, `(a)[1]`, `s.a`.
+fn is_part(scan: &Scan, text: &str, mut i: usize) -> bool {
     let word = |i: usize| -> &str {
         scan.tokens
             .get(i)
             .map_or("", |token| &text[token.start..token.end])
     };
-    let mut parens = 0;
-    while word(i) == "(" {
-        parens += 1;
+    while matches!(word(i), "(" | "*") {
         i += 1;
     }
-    if scan.tokens.get(i)?.kind != Kind::Ident {
-        return None;
-    }
     i += 1;
-    loop {
-        match word(i) {
-            "[" => return Some(i),
-            "." => i += 2,
-            ")" if parens > 0 => {
-                parens -= 1;
-                i += 1;
-            }
-            _ => return None,
+    while word(i) == ")" {
+        i += 1;
+        // The end of the argument list.
+        if !matches!(word(i), "[" | ".") {
+            return false;
         }
     }
+    matches!(word(i), "[" | ".")
 }
 
 impl Module {
@@ -606,14 +643,23 @@ pub fn check_modules(linker: &mut Linker, declared: &Declared) -> Diags {
             // As a top text all its functions are validated; as an import its names are.
             let texts: [(&str, &[String]); 2] = [(&module.text, &[]), ("", &plug_in)];
             let outcome = texts.into_iter().try_for_each(|(text, plug_ins)| {
-                linker
-                    .link(&LinkInput {
-                        text,
-                        file: &module.file,
-                        defs: &defs,
-                        plug_ins,
-                    })
-                    .map(|_| ())
+                let linked = linker.link(&LinkInput {
+                    text,
+                    file: &module.file,
+                    defs: &defs,
+                    plug_ins,
+                })?;
+                // What is imported bears the linker's marks, and was checked before.
+                let found: Diags = Diags(
+                    crate::gate::partial_pointers(&linked)
+                        .into_iter()
+                        .filter_map(|fault| {
+                            let item = module.item(fault.item.as_deref()?)?;
+                            Some(module.diag(item.at, fault.message))
+                        })
+                        .collect(),
+                );
+                found.ok(())
             });
             if let Err(more) = outcome {
                 for mut diag in more.0 {

@@ -342,15 +342,7 @@ pub(crate) fn stage(
                 ));
             }
         };
-        let default = match item.init {
-            None => None,
-            Some(init) => Some(constant(module, init).ok_or_else(|| {
-                (
-                    name.clone(),
-                    "the default of an override must be a number, not an expression".to_owned(),
-                )
-            })?),
-        };
+        let default = item.init.and_then(|init| constant(module, init));
         tables.overrides.push(Override {
             name,
             id: item.id,
@@ -362,6 +354,19 @@ pub(crate) fn stage(
     }
     tables.overrides.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(tables)
+}
+
+/// The name of an override whose default is an expression: naga's WGSL writer cannot write all of them, and a host could
+/// not know the value.
+pub(crate) fn computed_default(module: &Module) -> Option<String> {
+    module
+        .overrides
+        .iter()
+        .find(|(_, item)| {
+            item.init
+                .is_some_and(|init| constant(module, init).is_none())
+        })
+        .map(|(_, item)| item.name.clone().unwrap_or_default())
 }
 
 /// The value of a constant expression.

@@ -194,6 +194,8 @@ pub struct Head {
     pub start: usize,
     /// Byte after the semicolon.
     pub end: usize,
+    /// It stands in a branch of a condition.
+    pub conditional: bool,
 }
 
 /// A fault of the text itself.
@@ -326,6 +328,7 @@ impl Scan {
         let mut at = 0;
         // Nothing but blanks and comments so far on this line.
         let mut line_start = true;
+        let mut quoted = false;
         while at < bytes.len() {
             let byte = bytes[at];
             if byte == b'\n' || byte == b'\r' {
@@ -375,7 +378,11 @@ impl Scan {
                     self.push(Kind::Number, at, end);
                     end
                 } else {
+                    // The one that closes needs no report of its own.
                     if byte == b'"' {
+                        quoted = !quoted;
+                    }
+                    if byte == b'"' && quoted {
                         self.fault(at, "a quotation mark is not WGSL");
                     }
                     let end = match &bytes[at..(at + 2).min(bytes.len())] {
@@ -583,7 +590,7 @@ impl Scan {
                         .push(format!(
                             "a flag is tested by `#ifdef {name}`, a size by `#if {name} == 2`"
                         ));
-                    return unreadable(name, at);
+                    return unreadable("", at);
                 }
             };
             let (negative, number) = match (words.get(3), words.get(4)) {
@@ -595,7 +602,7 @@ impl Scan {
                     after(words[2]),
                     format!("`#if {name} {op}` expects a whole number"),
                 );
-                return unreadable(name, at);
+                return unreadable("", at);
             };
             let digits = number.trim_end_matches(['u', 'i']);
             let Ok(value) = digits.parse::<i64>() else {
@@ -603,7 +610,7 @@ impl Scan {
                     number_at,
                     format!("`#if {name} {op}` expects a whole number, which `{number}` is not"),
                 );
-                return unreadable(name, at);
+                return unreadable("", at);
             };
             let rest = if negative { 5 } else { 4 };
             self.no_tail(text, words, rest);
@@ -786,6 +793,7 @@ impl Scan {
                         names,
                         start: token.start,
                         end,
+                        conditional: !depths.is_empty(),
                     });
                     doc_from = end;
                     i = j + 1;
