@@ -11,3 +11,4 @@ pub use compose::finish;
 pub use diag::{Diag, Diags};
 pub use library::Library;
 pub use link::{Def, Defs, LinkInput, Linker};
+pub mod sp;
