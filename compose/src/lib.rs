@@ -1,6 +1,7 @@
 //! The composer.
 
 pub mod diag;
+pub mod fuzz;
 pub mod header;
 pub mod keys;
 pub mod ron_place;

@@ -1,3 +1,4 @@
 //! All tests of the composer in one binary.
 
+mod fuzz;
 mod readers;
