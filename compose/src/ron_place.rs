@@ -333,16 +333,19 @@ impl<'a> Tokens<'a> {
                 let word = self.word();
                 let end = self.at;
                 self.blanks();
-                if self.peek() == Some('(') {
-                    if word == "Some" {
-                        self.bump();
-                        let inner = self.value(depth + 1);
+                if word == "Some" {
+                    // With `implicit_some` the parentheses may be missing.
+                    let closed = self.eat('(');
+                    let inner = self.value(depth + 1);
+                    if closed {
                         self.blanks();
                         self.eat(',');
                         self.blanks();
                         self.eat(')');
-                        return Shape::Wrapped(Box::new(inner));
                     }
+                    return Shape::Wrapped(Box::new(inner));
+                }
+                if self.peek() == Some('(') {
                     return self.parens(depth);
                 }
                 self.at = end;
