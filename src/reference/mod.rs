@@ -3,8 +3,10 @@
 pub mod atmosphere;
 pub mod clouds;
 pub mod fractal;
+pub mod hash;
 pub mod math;
 pub mod medium;
+pub mod noise;
 pub mod phase;
 pub mod planet;
 pub mod post;
