@@ -5,6 +5,7 @@ mod atmosphere;
 mod clouds;
 mod common;
 mod eval;
+mod landscape;
 mod phase;
 mod planet;
 mod terrain;
