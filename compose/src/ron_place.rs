@@ -4,6 +4,8 @@
 //! once more, forgives everything, and its tree is walked in step with ron's; a part that does not match has the place
 //! of its parent. The values are ron's.
 
+use std::collections::BTreeMap;
+
 use ron::value::Value;
 
 use crate::diag::{Diag, Diags};
@@ -36,7 +38,7 @@ pub enum Kind {
     Map(Vec<Entry>),
     /// `None`.
     Nothing,
-    /// What no file of ours holds: a bare word, a character, bytes.
+    /// What no file of ours holds: a bare word, a character, bytes, a range.
     Other(&'static str),
 }
 
@@ -331,16 +333,19 @@ impl<'a> Tokens<'a> {
                 let word = self.word();
                 let end = self.at;
                 self.blanks();
-                if self.peek() == Some('(') {
-                    if word == "Some" {
-                        self.bump();
-                        let inner = self.value(depth + 1);
+                if word == "Some" {
+                    // With `implicit_some` the parentheses may be missing.
+                    let closed = self.eat('(');
+                    let inner = self.value(depth + 1);
+                    if closed {
                         self.blanks();
                         self.eat(',');
                         self.blanks();
                         self.eat(')');
-                        return Shape::Wrapped(Box::new(inner));
                     }
+                    return Shape::Wrapped(Box::new(inner));
+                }
+                if self.peek() == Some('(') {
                     return self.parens(depth);
                 }
                 self.at = end;
@@ -426,27 +431,18 @@ impl<'a> Tokens<'a> {
 
     /// A number, a word or a raw name; stops at blanks, brackets, commas, colons and comments.
     fn word(&mut self) -> &'a str {
-        let rest = self.rest();
-        let end = rest
-            .char_indices()
-            .find(|&(at, c)| {
-                c.is_whitespace()
-                    || matches!(c, '\u{200e}' | '\u{200f}')
-                    || matches!(
-                        c,
-                        ',' | ':' | '(' | ')' | '[' | ']' | '{' | '}' | '"' | '/'
-                    )
-                    // `b'x'` is a number for ron.
-                    || (c == '\'' && at != 1)
-            })
-            .map_or(rest.len(), |(at, _)| at);
-        if rest.starts_with("b'") {
-            self.at += 1;
-            self.character();
-            return &self.text[self.at - 1..self.at];
+        let start = self.at;
+        while let Some(c) = self.peek() {
+            match c {
+                // `b'x'` is a number for ron.
+                '\'' if self.text[start..self.at].ends_with('b') => self.character(),
+                ',' | ':' | '(' | ')' | '[' | ']' | '{' | '}' | '"' | '\'' | '/' => break,
+                '\u{200e}' | '\u{200f}' => break,
+                c if c.is_whitespace() => break,
+                _ => self.bump(),
+            }
         }
-        self.at += end;
-        &rest[..end]
+        &self.text[start..self.at]
     }
 
     /// Strings with a prefix: `r"..."`, `r#"..."#`, `b"..."`, `br"..."`, `br#"..."#`.
@@ -557,6 +553,8 @@ impl Walk<'_> {
                 let leaf = leaf(place);
                 Kind::List(values.into_iter().map(|v| self.node(v, &leaf)).collect())
             }
+            // `1..2` is a map for ron.
+            (Value::Map(_), Shape::Leaf) => Kind::Other("a range"),
             (Value::Map(map), shape) => self.map(map, shape, place),
             (value, shape) => {
                 let empty = match (&value, shape) {
@@ -578,9 +576,14 @@ impl Walk<'_> {
 
     fn map(&mut self, mut map: ron::Map, shape: &Shape, place: &Place) -> Kind {
         let mut entries: Vec<Entry> = Vec::with_capacity(map.len());
-        let mut seen = std::collections::BTreeMap::new();
+        let mut seen: BTreeMap<&String, usize> = BTreeMap::new();
         if let Shape::Map(places) = shape {
-            for (key, value_place) in places {
+            // Of equal keys ron keeps the last.
+            let last: BTreeMap<&String, &Place> = places
+                .iter()
+                .filter_map(|(key, place)| Some((key.name.as_ref()?, place)))
+                .collect();
+            for (key, _) in places {
                 let Some(name) = &key.name else {
                     continue;
                 };
@@ -595,8 +598,9 @@ impl Walk<'_> {
                     continue;
                 }
                 seen.insert(name, key.start);
-                if let Some(value) = map.remove(&Value::String(name.clone())) {
-                    let value = self.node(value, value_place);
+                let value = map.remove(&Value::String(name.clone()));
+                if let (Some(value), Some(&place)) = (value, last.get(name)) {
+                    let value = self.node(value, place);
                     entries.push(Entry {
                         key: name.clone(),
                         start: key.start,
@@ -626,7 +630,7 @@ impl Walk<'_> {
                     value,
                 });
             } else if unnamed.is_empty() {
-                // A range such as `1..2` has no keys in the text.
+                self.exact = false;
                 unnamed.push(place.start);
             }
         }
