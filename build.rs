@@ -1,1 +1,2 @@
+//! Composes the programs.
 fn main() {}

@@ -1,1 +1,16 @@
 //! The composer.
+
+pub mod compose;
+pub mod diag;
+pub mod gate;
+pub mod library;
+pub mod link;
+pub mod lint;
+pub mod reflect;
+pub mod scan;
+pub mod sp;
+
+pub use compose::{Composed, Composer, finish};
+pub use diag::{Diag, Diags};
+pub use library::Library;
+pub use link::{Def, Defs, LinkInput, Linker};

@@ -1,0 +1,3 @@
+//! All tests of the composer in one binary.
+
+mod link;

@@ -1,0 +1,4 @@
+//! Located errors, the `.sp` reader, keys, presets, scenes, views and module headers.
+
+mod diag;
+mod sp;
