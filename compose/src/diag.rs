@@ -23,6 +23,23 @@ pub struct Diag {
     pub notes: Vec<String>,
 }
 
+/// A place in a file; both numbers count from 1, the column in characters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Place {
+    /// The line.
+    pub line: u32,
+    /// The column.
+    pub column: u32,
+}
+
+impl Place {
+    /// The place of byte `offset` in `text`.
+    pub fn of(text: &str, offset: usize) -> Self {
+        let (line, column) = line_column(text, offset);
+        Self { line, column }
+    }
+}
+
 /// A line longer than this many characters is shown as a window around the column.
 const SHOWN_WIDTH: usize = 160;
 
@@ -254,6 +271,11 @@ pub(crate) fn line_starts(text: &str) -> impl Iterator<Item = (usize, usize)> + 
         };
         Some((from, end))
     })
+}
+
+/// `text` without a byte order mark.
+pub(crate) fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
 }
 
 /// The candidate that resembles `name` most, if one does: the fewest insertions, deletions, replacements and swaps of

@@ -7,19 +7,11 @@
 use std::fmt;
 use std::io;
 
-use crate::diag::{Diag, Diags, line_at, line_starts};
+pub use crate::diag::Place;
+use crate::diag::{Diag, Diags, line_at, line_starts, without_mark};
 
 /// After this many faults a file is given up.
 const MOST_FAULTS: usize = 100;
-
-/// A place in a `.sp` file; both numbers count from 1, the column in characters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
-    /// The line.
-    pub line: u32,
-    /// The column.
-    pub column: u32,
-}
 
 /// The stages that WGSL has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -354,9 +346,8 @@ impl SpFile {
             };
             self.diag(place, fault)
         })?;
-        if text.starts_with(BOM) {
-            text.drain(..BOM.len_utf8());
-        }
+        let mark = text.len() - without_mark(&text).len();
+        text.drain(..mark);
         if let Some(at) = nested_tag(&text) {
             return Err(Diag::at(
                 name,
@@ -401,8 +392,6 @@ fn join(file: &str, path: &str) -> String {
         None => path.to_owned(),
     }
 }
-
-const BOM: char = '\u{feff}';
 
 /// The tags of the format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -565,7 +554,7 @@ impl Level {
 /// # Errors
 /// All faults that can be told apart from their consequences, in the order of the file.
 pub fn parse(file: &str, text: &str) -> Result<SpFile, Diags> {
-    let text = text.strip_prefix(BOM).unwrap_or(text);
+    let text = without_mark(text);
     let mut reader = Reader {
         file,
         text,
