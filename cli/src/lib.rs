@@ -8,6 +8,8 @@ pub mod cpu;
 pub mod error;
 pub mod image;
 pub mod render;
+pub mod runtime;
+pub mod shipped;
 pub mod table;
 
 pub use args::Args;
