@@ -68,7 +68,8 @@ pub fn cloud_density(layer: &CloudLayer, relative: [f64; 3], altitude: f64) -> f
         return 0.0;
     }
     let place = add(layer.frac, scale([relative[0], altitude, relative[2]], 1.0 / layer.wavelength));
-    let n = fbm_value_3d_periodic(layer.cell, place, [layer.period; 3], layer.octaves, layer.hurst, layer.seed);
+    let period = if layer.period > 0 { layer.period } else { 1 << 20 };
+    let n = fbm_value_3d_periodic(layer.cell, place, [period; 3], layer.octaves, layer.hurst, layer.seed);
     shape_coverage(n, layer.coverage, layer.uniformity)
 }
 

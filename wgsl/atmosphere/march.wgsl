@@ -52,7 +52,7 @@ fn air_density(atmosphere: Atmosphere, h: f32) -> vec2<f32> {
 /// domain  mu in [-0.1, 1] 1 lin
 /// domain  steps in [1, 512] 1 lin
 /// range   [0, 1e7] m
-/// error   4e-6 rel of reference::atmosphere::air_column
+/// error   2e-5 rel of reference::atmosphere::air_column
 /// source  Leitner2022 alg. 7 (raymarchToLight)
 fn air_column(atmosphere: Atmosphere, h: f32, mu: f32, steps: i32) -> vec2<f32> {
     let count = max(steps, 1);
