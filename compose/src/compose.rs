@@ -58,6 +58,7 @@ pub struct Composer {
     declared: Declared,
     plug_ins: Vec<String>,
     any_override: bool,
+    require_headers: bool,
     read: Reader,
     stages: BTreeMap<(String, StageKind, Defs), Rc<DoneStage>>,
     passed: BTreeSet<String>,
@@ -113,8 +114,7 @@ impl SourceStage {
         if let Some(name) = &fault.item
             && !here(name)
         {
-            let reached =
-                library.reached(self.scan.imports().map(|import| import.module.as_str()));
+            let reached = library.reached(self.scan.imports().map(|import| import.module.as_str()));
             for module in reached {
                 if let Some(item) = module.item(name) {
                     return module.diag(item.at, fault.message.clone());
@@ -150,6 +150,7 @@ impl Composer {
             declared,
             plug_ins: Vec::new(),
             any_override: false,
+            require_headers: false,
             read: Box::new(|path| std::fs::read_to_string(path)),
             stages: BTreeMap::new(),
             passed: BTreeSet::new(),
@@ -188,6 +189,13 @@ impl Composer {
         self
     }
 
+    /// Whether every module must have headers in the grammar of `docs/modules.md`; else only those that start with `//!`.
+    #[must_use]
+    pub fn require_headers(mut self, yes: bool) -> Self {
+        self.require_headers = yes;
+        self
+    }
+
     /// Reads the files of `SRC` tags by a function instead of from the disk.
     #[must_use]
     pub fn reader(mut self, read: Reader) -> Self {
@@ -212,7 +220,16 @@ impl Composer {
 
     /// Checks every module by itself: lints, and composes it with its flags off and with each of them on.
     pub fn check_modules(&mut self) -> Diags {
-        lint::check_modules(&mut self.linker, &self.declared)
+        let mut diags = Diags::new();
+        for module in self.linker.library().modules() {
+            if (self.require_headers || module.text.trim_start().starts_with("//!"))
+                && let Err(found) = crate::header::parse_headers(&module.file, &module.text)
+            {
+                diags.append(found);
+            }
+        }
+        diags.append(lint::check_modules(&mut self.linker, &self.declared));
+        diags
     }
 
     /// Stitches and lints a program.
@@ -260,9 +277,10 @@ impl Composer {
             .iter()
             .flat_map(|stage| stage.relevant.iter().cloned())
             .collect();
-        let name = Path::new(sp.file())
-            .file_stem()
-            .map_or_else(|| sp.name.clone(), |stem| stem.to_string_lossy().into_owned());
+        let name = Path::new(sp.file()).file_stem().map_or_else(
+            || sp.name.clone(),
+            |stem| stem.to_string_lossy().into_owned(),
+        );
         diags.ok(Program {
             name,
             file: sp.file().to_owned(),
@@ -359,7 +377,11 @@ impl Composer {
             .collect();
         reached.extend(library.reached(plug_ins.iter().map(String::as_str)));
         let mut relevant = scan.mentioned(text);
-        relevant.extend(reached.iter().flat_map(|module| module.flags.iter().cloned()));
+        relevant.extend(
+            reached
+                .iter()
+                .flat_map(|module| module.flags.iter().cloned()),
+        );
         SourceStage {
             kind,
             stitched,
@@ -561,11 +583,7 @@ impl Composer {
             .collect();
         let key = (program.file.clone(), stage.kind, defs);
         // The same program may come again with another text, when it is reloaded at run time.
-        let key = (
-            format!("{}\n{}", key.0, stage.stitched.text),
-            key.1,
-            key.2,
-        );
+        let key = (format!("{}\n{}", key.0, stage.stitched.text), key.1, key.2);
         if let Some(done) = self.stages.get(&key) {
             return Ok(done.clone());
         }
@@ -611,16 +629,16 @@ impl Composer {
             return Err(stage
                 .diag_of(
                     Some(&item),
-                    &format!("the default of override `{item}` must be a number, not an expression"),
+                    &format!(
+                        "the default of override `{item}` must be a number, not an expression"
+                    ),
                 )
                 .into());
         }
         let capabilities = self.linker.capabilities();
         let mut finished = gate::no_panic(|| finish(module, capabilities))
             .unwrap_or_else(|panic| Err(format!("the WGSL writer panicked: {panic}")))
-            .map_err(|error| {
-                stage.diag_of(None, &format!("cannot be written as WGSL: {error}"))
-            })?;
+            .map_err(|error| stage.diag_of(None, &format!("cannot be written as WGSL: {error}")))?;
         let heads: String = stage
             .scan
             .heads
@@ -825,7 +843,10 @@ fn merge(done: &[(&SourceStage, Rc<DoneStage>)], diags: &mut Diags) -> Merged {
                             diags,
                             stage.diag_of(
                                 Some(&item.name),
-                                &format!("override `{}` differs from that of another stage", item.name),
+                                &format!(
+                                    "override `{}` differs from that of another stage",
+                                    item.name
+                                ),
                             ),
                         );
                     }

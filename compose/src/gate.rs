@@ -157,13 +157,11 @@ fn with_defaults(module: &Module, info: &ModuleInfo) -> Result<(Module, ModuleIn
 
 fn write(module: &Module, info: &ModuleInfo, target: Target) -> Result<Written, String> {
     match target {
-        Target::Wgsl => naga::back::wgsl::write_string(
-            module,
-            info,
-            naga::back::wgsl::WriterFlags::empty(),
-        )
-        .map(Written::Text)
-        .map_err(|error| chain(&error)),
+        Target::Wgsl => {
+            naga::back::wgsl::write_string(module, info, naga::back::wgsl::WriterFlags::empty())
+                .map(Written::Text)
+                .map_err(|error| chain(&error))
+        }
         Target::Spirv => {
             let options = spv::Options {
                 lang_version: (1, 3),
@@ -235,8 +233,8 @@ impl GateFault {
 pub fn check(wgsl: &str, written_from: &Module, capabilities: Capabilities) -> Vec<GateFault> {
     let mut faults = Vec::new();
     let parsed = no_panic(|| {
-        let module = naga::front::wgsl::parse_str(wgsl)
-            .map_err(|error| error.message().to_owned())?;
+        let module =
+            naga::front::wgsl::parse_str(wgsl).map_err(|error| error.message().to_owned())?;
         let info = validate(&module, capabilities)?;
         Ok::<_, String>((module, info))
     });
@@ -276,10 +274,14 @@ pub fn check(wgsl: &str, written_from: &Module, capabilities: Capabilities) -> V
         match no_panic(|| write(module, info, target)) {
             Ok(Ok(_)) => {}
             Ok(Err(error)) => {
-                faults.push(GateFault::whole(format!("cannot be written as {name}: {error}")));
+                faults.push(GateFault::whole(format!(
+                    "cannot be written as {name}: {error}"
+                )));
             }
             Err(panic) => {
-                faults.push(GateFault::whole(format!("the {name} writer panicked: {panic}")));
+                faults.push(GateFault::whole(format!(
+                    "the {name} writer panicked: {panic}"
+                )));
             }
         }
     }
@@ -486,7 +488,9 @@ fn limits(module: &Module, info: &ModuleInfo, faults: &mut Vec<GateFault>) {
             if count > most {
                 faults.push(GateFault::of(
                     name,
-                    format!("{count} {what} in `{name}` are more than WebGPU's default limit of {most}"),
+                    format!(
+                        "{count} {what} in `{name}` are more than WebGPU's default limit of {most}"
+                    ),
                 ));
             }
         }
@@ -555,18 +559,26 @@ fn global_limits(module: &Module, global: &naga::GlobalVariable, faults: &mut Ve
         AddressSpace::Uniform => {
             let size = u64::from(ty.size(module.to_ctx()));
             if size > limit::UNIFORM_BYTES {
-                over(format!("a uniform size of {size} bytes"), limit::UNIFORM_BYTES);
+                over(
+                    format!("a uniform size of {size} bytes"),
+                    limit::UNIFORM_BYTES,
+                );
             }
         }
         AddressSpace::Storage { .. } => {
             let size = u64::from(ty.size(module.to_ctx()));
             if size > limit::STORAGE_BYTES {
-                over(format!("a storage size of {size} bytes"), limit::STORAGE_BYTES);
+                over(
+                    format!("a storage size of {size} bytes"),
+                    limit::STORAGE_BYTES,
+                );
             }
         }
         AddressSpace::Immediate => faults.push(GateFault::of(
             name,
-            format!("`{name}` is in the address space `immediate`, which WebGPU's core does not have"),
+            format!(
+                "`{name}` is in the address space `immediate`, which WebGPU's core does not have"
+            ),
         )),
         _ => {}
     }
@@ -599,7 +611,9 @@ fn global_limits(module: &Module, global: &naga::GlobalVariable, faults: &mut Ve
             let access = if read_write { " with `read_write`" } else { "" };
             faults.push(GateFault::of(
                 name,
-                format!("storage texture format `{format}`{access} of `{name}` is not in WebGPU's core"),
+                format!(
+                    "storage texture format `{format}`{access} of `{name}` is not in WebGPU's core"
+                ),
             ));
         }
     }
@@ -621,10 +635,7 @@ fn bindings(
     }
 }
 
-fn inputs(
-    module: &Module,
-    entry: &naga::EntryPoint,
-) -> Vec<(Binding, naga::Handle<naga::Type>)> {
+fn inputs(module: &Module, entry: &naga::EntryPoint) -> Vec<(Binding, naga::Handle<naga::Type>)> {
     entry
         .function
         .arguments
@@ -633,10 +644,7 @@ fn inputs(
         .collect()
 }
 
-fn outputs(
-    module: &Module,
-    entry: &naga::EntryPoint,
-) -> Vec<(Binding, naga::Handle<naga::Type>)> {
+fn outputs(module: &Module, entry: &naga::EntryPoint) -> Vec<(Binding, naga::Handle<naga::Type>)> {
     entry
         .function
         .result
@@ -648,7 +656,10 @@ fn outputs(
 fn interface_limits(module: &Module, entry: &naga::EntryPoint, faults: &mut Vec<GateFault>) {
     use naga::ShaderStage as Stage;
     let name = entry.name.as_str();
-    let mut check = |what: &str, list: &[(Binding, naga::Handle<naga::Type>)], most: u32, builtins: u32| {
+    let mut check = |what: &str,
+                     list: &[(Binding, naga::Handle<naga::Type>)],
+                     most: u32,
+                     builtins: u32| {
         let locations: Vec<u32> = list
             .iter()
             .filter_map(|(binding, _)| match binding {
@@ -660,7 +671,9 @@ fn interface_limits(module: &Module, entry: &naga::EntryPoint, faults: &mut Vec<
         if count > most {
             faults.push(GateFault::of(
                 name,
-                format!("{count} {what} of `{name}` are more than WebGPU's default limit of {most}"),
+                format!(
+                    "{count} {what} of `{name}` are more than WebGPU's default limit of {most}"
+                ),
             ));
         } else if let Some(location) = locations.iter().find(|location| **location >= most) {
             faults.push(GateFault::of(

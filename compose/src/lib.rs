@@ -1,8 +1,12 @@
 //! The composer.
 
+pub mod build;
 pub mod compose;
 pub mod diag;
+pub mod emit;
+pub mod fuzz;
 pub mod gate;
+pub mod header;
 pub mod keys;
 pub mod library;
 pub mod link;
@@ -13,6 +17,7 @@ pub mod scan;
 pub mod settings;
 pub mod sp;
 
+pub use build::Build;
 pub use compose::{Composed, Composer, finish};
 pub use diag::{Diag, Diags};
 pub use keys::Keys;

@@ -111,7 +111,10 @@ impl Library {
     pub fn from_sources(files: Vec<(String, String)>) -> Result<Self, Diags> {
         let mut diags = Diags::new();
         let mut library = Self::default();
-        for (file, text) in files {
+        for (file, mut text) in files {
+            if text.starts_with('\u{feff}') {
+                text.drain(..'\u{feff}'.len_utf8());
+            }
             let scan = Scan::new(&text);
             let Some((path, at)) = scan.import_path() else {
                 // A piece for SRC, unless it tries to be a module.

@@ -277,7 +277,12 @@ impl Linker {
         };
         let said = message.to_lowercase();
         notes.retain(|note| {
-            const IDLE: [&str; 4] = ["naga::ir::", "see msg", "unknown identifier", "definition of"];
+            const IDLE: [&str; 4] = [
+                "naga::ir::",
+                "see msg",
+                "unknown identifier",
+                "definition of",
+            ];
             !said.contains(&note.to_lowercase()) && !IDLE.iter().any(|idle| note.starts_with(idle))
         });
         let Some(offset) = offset else {

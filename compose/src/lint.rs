@@ -251,7 +251,10 @@ fn heads(what: Text<'_>, scan: &Scan, capabilities: Capabilities, faults: &mut V
                     if name == "f16" {
                         if !capabilities.contains(Capabilities::SHADER_FLOAT16) {
                             faults.push(note(
-                                fault(*at, "`enable f16` needs the capability `f16`, which is not claimed"),
+                                fault(
+                                    *at,
+                                    "`enable f16` needs the capability `f16`, which is not claimed",
+                                ),
                                 "claim it in the build: `.claim(\"f16\")`",
                             ));
                         }
@@ -335,10 +338,7 @@ fn reserved_name(name: &str, at: usize, faults: &mut Vec<Fault>) {
     if name.contains("X_naga_oil_") {
         faults.push(fault(at, "`X_naga_oil_` is reserved for the linker"));
     } else if name.contains("__") {
-        faults.push(fault(
-            at,
-            format!("`{name}`: a name must not contain `__`"),
-        ));
+        faults.push(fault(at, format!("`{name}`: a name must not contain `__`")));
     } else if name.starts_with('_') {
         faults.push(fault(
             at,
@@ -380,7 +380,10 @@ fn module_item(path: &str, item: &Item, faults: &mut Vec<Fault>) {
         )),
         ItemKind::VirtualFunction if !VIRTUAL_MODULES.contains(&path) => faults.push(note(
             fault(item.at, format!("`virtual fn {name}` is not allowed here")),
-            format!("only {} may declare virtual functions", quoted(&VIRTUAL_MODULES)),
+            format!(
+                "only {} may declare virtual functions",
+                quoted(&VIRTUAL_MODULES)
+            ),
         )),
         _ => {}
     }
@@ -395,7 +398,10 @@ fn module_item(path: &str, item: &Item, faults: &mut Vec<Fault>) {
         ));
     }
     for member in &item.members {
-        if member.name.ends_with(|c: char| c == '_' || c.is_ascii_digit()) {
+        if member
+            .name
+            .ends_with(|c: char| c == '_' || c.is_ascii_digit())
+        {
             faults.push(note(
                 fault(
                     member.at,
@@ -601,9 +607,7 @@ impl Module {
             diag.notes = fault.notes;
             diags.push(diag);
         }
-        diags
-            .0
-            .sort_by_key(|diag| (diag.line, diag.column));
+        diags.0.sort_by_key(|diag| (diag.line, diag.column));
         diags
     }
 }
@@ -680,7 +684,8 @@ pub fn check_modules(linker: &mut Linker, declared: &Declared) -> Diags {
 /// Adds a diagnostic unless its place and message are there already.
 pub(crate) fn push_new(diags: &mut Diags, diag: Diag) {
     let known = diags.iter().any(|d| {
-        (&d.file, d.line, d.column, &d.message) == (&diag.file, diag.line, diag.column, &diag.message)
+        (&d.file, d.line, d.column, &d.message)
+            == (&diag.file, diag.line, diag.column, &diag.message)
     });
     if !known {
         diags.push(diag);

@@ -4,6 +4,8 @@
 //! once more, forgives everything, and its tree is walked in step with ron's; a part that does not match has the place
 //! of its parent. The values are ron's.
 
+use std::collections::BTreeMap;
+
 use ron::value::Value;
 
 use crate::diag::{Diag, Diags};
@@ -36,7 +38,7 @@ pub enum Kind {
     Map(Vec<Entry>),
     /// `None`.
     Nothing,
-    /// What no file of ours holds: a bare word, a character, bytes.
+    /// What no file of ours holds: a bare word, a character, bytes, a range.
     Other(&'static str),
 }
 
@@ -557,6 +559,8 @@ impl Walk<'_> {
                 let leaf = leaf(place);
                 Kind::List(values.into_iter().map(|v| self.node(v, &leaf)).collect())
             }
+            // `1..2` is a map for ron.
+            (Value::Map(_), Shape::Leaf) => Kind::Other("a range"),
             (Value::Map(map), shape) => self.map(map, shape, place),
             (value, shape) => {
                 let empty = match (&value, shape) {
@@ -578,9 +582,14 @@ impl Walk<'_> {
 
     fn map(&mut self, mut map: ron::Map, shape: &Shape, place: &Place) -> Kind {
         let mut entries: Vec<Entry> = Vec::with_capacity(map.len());
-        let mut seen = std::collections::BTreeMap::new();
+        let mut seen: BTreeMap<&String, usize> = BTreeMap::new();
         if let Shape::Map(places) = shape {
-            for (key, value_place) in places {
+            // Of equal keys ron keeps the last.
+            let last: BTreeMap<&String, &Place> = places
+                .iter()
+                .filter_map(|(key, place)| Some((key.name.as_ref()?, place)))
+                .collect();
+            for (key, _) in places {
                 let Some(name) = &key.name else {
                     continue;
                 };
@@ -595,8 +604,9 @@ impl Walk<'_> {
                     continue;
                 }
                 seen.insert(name, key.start);
-                if let Some(value) = map.remove(&Value::String(name.clone())) {
-                    let value = self.node(value, value_place);
+                let value = map.remove(&Value::String(name.clone()));
+                if let (Some(value), Some(&place)) = (value, last.get(name)) {
+                    let value = self.node(value, place);
                     entries.push(Entry {
                         key: name.clone(),
                         start: key.start,
@@ -626,7 +636,7 @@ impl Walk<'_> {
                     value,
                 });
             } else if unnamed.is_empty() {
-                // A range such as `1..2` has no keys in the text.
+                self.exact = false;
                 unnamed.push(place.start);
             }
         }

@@ -146,11 +146,7 @@ fn faults_of_stages() {
     check("stages.txt", |text| {
         let piece = "const PIECE: f32 = 1.0;\nfn piece() -> f32 { return PIECE + missing; }\n";
         faults(
-            &[
-                ("p.sp", text),
-                ("used.wgsl", USED),
-                ("piece.wgsl", piece),
-            ],
+            &[("p.sp", text), ("used.wgsl", USED), ("piece.wgsl", piece)],
             &[],
         )
     });
