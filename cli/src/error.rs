@@ -63,7 +63,7 @@ pub enum CliError {
         needed: String,
     },
     /// Paths or names that lead nowhere.
-    #[error("{what} `{name}` does not exist{}", hint(.hint))]
+    #[error("{what} `{name}` does not exist{}", or_else(.hint))]
     Missing {
         /// What was looked for.
         what: &'static str,
@@ -80,7 +80,7 @@ pub enum CliError {
     },
 }
 
-fn hint(hint: &str) -> String {
+fn or_else(hint: &str) -> String {
     if hint.is_empty() {
         String::new()
     } else {
