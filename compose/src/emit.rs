@@ -319,7 +319,7 @@ impl File<'_> {
             "\n/// The composed variants with their keys, presets and scenes.\n\
              pub static PROGRAMS: {p}::ProgramSet = {p}::ProgramSet {{\n    programs: {},\n    keys: {},\n    presets: {},\n    scenes: {},\n    default_preset: {},\n}};\n\n\
              /// The composed variants with their keys, presets and scenes.\n\
-             pub fn programs() -> &'static {p}::ProgramSet {{\n    &PROGRAMS\n}}\n",
+             #[allow(dead_code)]\npub fn programs() -> &'static {p}::ProgramSet {{\n    &PROGRAMS\n}}\n",
             borrowed("VARIANTS"),
             borrowed("KEYS"),
             borrowed("PRESETS"),
@@ -342,10 +342,10 @@ impl File<'_> {
             }
         }
         self.line("/// The blocks of the composed programs: what a host puts into uniform and storage buffers.");
-        self.line("#[allow(non_camel_case_types, non_snake_case, clippy::manual_memcpy)]");
+        self.line("#[allow(dead_code, non_camel_case_types, non_snake_case, clippy::manual_memcpy)]");
         self.line("pub mod blocks {");
         self.line(
-            "    #[allow(dead_code)]\n    fn put(bytes: &mut [u8], at: usize, word: [u8; 4]) {\n        if let Some(place) = bytes.get_mut(at..at + 4) {\n            place.copy_from_slice(&word);\n        }\n    }\n",
+            "    fn put(bytes: &mut [u8], at: usize, word: [u8; 4]) {\n        if let Some(place) = bytes.get_mut(at..at + 4) {\n            place.copy_from_slice(&word);\n        }\n    }\n",
         );
         for layouts in by_name.values() {
             for (layout, composed) in layouts {

@@ -2,8 +2,10 @@
 
 mod accuracy;
 mod atmosphere;
+mod clouds;
 mod common;
 mod eval;
 mod phase;
 mod planet;
+mod terrain;
 mod tone_map;

@@ -1,5 +1,6 @@
 //! All tests of the composer in one binary.
 
+mod emit;
 mod faults;
 mod fuzz;
 mod link;
