@@ -23,6 +23,23 @@ pub struct Diag {
     pub notes: Vec<String>,
 }
 
+/// A place in a file; both numbers count from 1, the column in characters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Place {
+    /// The line.
+    pub line: u32,
+    /// The column.
+    pub column: u32,
+}
+
+impl Place {
+    /// The place of byte `offset` in `text`.
+    pub fn of(text: &str, offset: usize) -> Self {
+        let (line, column) = line_column(text, offset);
+        Self { line, column }
+    }
+}
+
 /// A line longer than this many characters is shown as a window around the column.
 const SHOWN_WIDTH: usize = 160;
 
@@ -256,16 +273,25 @@ pub(crate) fn line_starts(text: &str) -> impl Iterator<Item = (usize, usize)> + 
     })
 }
 
+/// `text` without a byte order mark.
+pub(crate) fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
+
 /// The candidate that resembles `name` most, if one does: the fewest insertions, deletions, replacements and swaps of
-/// neighbours, at most a third of the name's length; case counts half. Ties go to the first candidate.
+/// neighbours, at most a third of the name's length (but one from two letters on); case counts half. Ties go to the first candidate.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 128;
     let wanted: Vec<char> = name.chars().take(LONGEST + 1).collect();
     if wanted.is_empty() || wanted.len() > LONGEST {
         return None;
     }
-    // In half edits.
-    let allowed = 2 * (wanted.len() / 3).max(1);
+    // In half edits. Of a name of one letter nothing is left after an edit.
+    let allowed = if wanted.len() == 1 {
+        0
+    } else {
+        2 * (wanted.len() / 3).max(1)
+    };
     let mut best: Option<(usize, &'a str)> = None;
     for candidate in candidates {
         let other: Vec<char> = candidate.chars().take(LONGEST + 1).collect();

@@ -111,7 +111,10 @@ impl Library {
     pub fn from_sources(files: Vec<(String, String)>) -> Result<Self, Diags> {
         let mut diags = Diags::new();
         let mut library = Self::default();
-        for (file, text) in files {
+        for (file, mut text) in files {
+            if text.starts_with('\u{feff}') {
+                text.drain(..'\u{feff}'.len_utf8());
+            }
             let scan = Scan::new(&text);
             let Some((path, at)) = scan.import_path() else {
                 // A piece for SRC, unless it tries to be a module.
@@ -211,6 +214,15 @@ impl Library {
             .collect()
     }
 
+    /// Whether an import names a whole module for the sake of its `override fn`: a plug-in.
+    pub fn is_plug_in(&self, import: &Import) -> bool {
+        !self.modules.contains_key(&import.module)
+            && self
+                .modules
+                .get(&import.path())
+                .is_some_and(Module::overrides_functions)
+    }
+
     /// A fault if an import names nothing, with the nearest name.
     pub fn check_import(&self, file: &str, text: &str, import: &Import) -> Option<Diag> {
         let at = |at: usize, message: String| Diag::at(file, text, at, message);
@@ -226,6 +238,9 @@ impl Library {
         let Some(module) = self.modules.get(&import.module) else {
             let whole = import.path();
             if let Some(module) = self.modules.get(&whole) {
+                if module.overrides_functions() && import.local == import.item {
+                    return None;
+                }
                 let some: Vec<&str> = module
                     .scan
                     .items

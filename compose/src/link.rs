@@ -2,6 +2,7 @@
 //!
 //! [`Linker::link`] is all that the rest of the composer uses, so that another linker can take its place.
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use naga_oil::compose::{
@@ -11,7 +12,7 @@ use naga_oil::compose::{
 
 use crate::diag::{Diag, Diags, line_at};
 use crate::library::{LONGEST_TEXT, Library};
-use crate::scan::{Kind, Scan};
+use crate::scan::{Kind, Scan, Token};
 
 pub use crate::scan::{Def, Defs};
 
@@ -31,9 +32,36 @@ pub struct LinkInput<'a> {
 /// Links texts with the modules of a library; one linker serves a whole build.
 pub struct Linker {
     library: Library,
-    composer: Composer,
+    /// `None` after a panic: nobody knows what state it was in.
+    composer: Option<Composer>,
     capabilities: naga::valid::Capabilities,
     added: BTreeSet<String>,
+}
+
+thread_local! {
+    /// Composers that nobody uses: most of the time to make one goes into its regular expressions.
+    static POOL: RefCell<Vec<Composer>> = const { RefCell::new(Vec::new()) };
+}
+
+/// A composer without modules.
+fn fresh(capabilities: naga::valid::Capabilities) -> Composer {
+    let mut composer = POOL
+        .with_borrow_mut(Vec::pop)
+        .unwrap_or_else(Composer::default);
+    composer.capabilities = capabilities;
+    composer
+}
+
+impl Drop for Linker {
+    fn drop(&mut self) {
+        let Some(mut composer) = self.composer.take() else {
+            return;
+        };
+        composer.module_sets.clear();
+        composer.module_index.clear();
+        // The thread may be ending.
+        let _ = POOL.try_with(|pool| pool.borrow_mut().push(composer));
+    }
 }
 
 /// The first line of what naga_oil gets is ours: WGSL directives must come before everything else.
@@ -52,7 +80,7 @@ impl Linker {
     pub fn with_capabilities(library: &Library, capabilities: naga::valid::Capabilities) -> Self {
         Self {
             library: library.clone(),
-            composer: Composer::default().with_capabilities(capabilities),
+            composer: None,
             capabilities,
             added: BTreeSet::new(),
         }
@@ -102,22 +130,17 @@ impl Linker {
         if !diags.is_empty() {
             return Err(diags);
         }
-        let body = scan
-            .preprocess(input.text, input.defs)
+        let library = &self.library;
+        let (body, mut plug_ins) = scan
+            .preprocess(input.text, input.defs, &|import| library.is_plug_in(import))
             .map_err(|fault| Diag::at(input.file, input.text, fault.at, fault.message))?;
-        // naga_oil wants WGSL directives first; naga knows `enable f16` and loses all of them.
-        let mut source: String = scan
-            .heads
-            .iter()
-            .map(|head| head.text.split_whitespace().collect::<Vec<_>>().join(" ") + " ")
-            .collect();
-        source.push('\n');
-        source.push_str(&body);
+        plug_ins.extend_from_slice(input.plug_ins);
+        let source = with_heads(scan, &body);
 
         let wanted: Vec<&str> = scan
             .imports()
             .map(|import| import.module.as_str())
-            .chain(input.plug_ins.iter().map(String::as_str))
+            .chain(plug_ins.iter().map(String::as_str))
             .collect();
         self.add_modules(&wanted)?;
 
@@ -132,15 +155,14 @@ impl Linker {
                 (name.clone(), value)
             })
             .collect();
-        let additional: Vec<ImportDefinition> = input
-            .plug_ins
-            .iter()
-            .map(|module| ImportDefinition {
-                import: module.clone(),
+        let additional: Vec<ImportDefinition> = plug_ins
+            .into_iter()
+            .map(|import| ImportDefinition {
+                import,
                 items: Vec::new(),
             })
             .collect();
-        let composer = &mut self.composer;
+        let composer = self.composer();
         let outcome = crate::gate::no_panic(|| {
             composer
                 .make_naga_module(NagaModuleDescriptor {
@@ -156,14 +178,24 @@ impl Linker {
             Ok(Ok(module)) => Ok(module),
             Ok(Err(error)) => Err(self.diag(&error, Some((input, scan))).into()),
             Err(panic) => {
-                self.reset();
+                self.composer = None;
                 Err(panicked(input.file, &panic).into())
             }
         }
     }
 
+    /// naga_oil's composer; a new one has none of the modules yet.
+    fn composer(&mut self) -> &mut Composer {
+        let (capabilities, added) = (self.capabilities, &mut self.added);
+        self.composer.get_or_insert_with(|| {
+            added.clear();
+            fresh(capabilities)
+        })
+    }
+
     /// Adds the modules that are reached and not there yet, each after those that it imports.
     fn add_modules(&mut self, wanted: &[&str]) -> Result<(), Diags> {
+        self.composer();
         let missing: Vec<String> = self
             .library
             .reached(wanted.iter().copied())
@@ -185,8 +217,9 @@ impl Linker {
             if !diags.is_empty() {
                 return Err(diags);
             }
-            let source = module.scan.without_comments(&module.text);
-            let (composer, file) = (&mut self.composer, module.file.clone());
+            let source = with_heads(&module.scan, &module.scan.without_comments(&module.text));
+            let file = module.file.clone();
+            let composer = self.composer();
             let outcome = crate::gate::no_panic(|| {
                 composer
                     .add_composable_module(ComposableModuleDescriptor {
@@ -203,18 +236,12 @@ impl Linker {
                 }
                 Ok(Err(error)) => return Err(self.diag(&error, None).into()),
                 Err(panic) => {
-                    self.reset();
+                    self.composer = None;
                     return Err(panicked(&file, &panic).into());
                 }
             }
         }
         Ok(())
-    }
-
-    /// After a panic nobody knows what state naga_oil's composer is in.
-    fn reset(&mut self) {
-        self.composer = Composer::default().with_capabilities(self.capabilities);
-        self.added.clear();
     }
 
     /// naga_oil's error as a diagnostic at its place in the original file.
@@ -227,10 +254,11 @@ impl Linker {
                 .modules()
                 .find(|module| top.is_none() && module.file == *path),
         };
-        let (file, original, head_lines) = match (module, top) {
-            (Some(module), _) => (module.file.as_str(), module.text.as_str(), 0),
-            (None, Some((input, _))) => (input.file, input.text, HEAD_LINES),
-            (None, None) => ("naga_oil", "", 0),
+        let none = Scan::default();
+        let (file, original, scan) = match (module, top) {
+            (Some(module), _) => (module.file.as_str(), module.text.as_str(), &module.scan),
+            (None, Some((input, scan))) => (input.file, input.text, scan),
+            (None, None) => ("naga_oil", "", &none),
         };
         let (message, mut notes, offset) = describe(&error.inner);
         // `override fn` with another signature: naga_oil gives no place.
@@ -239,14 +267,24 @@ impl Linker {
         }
         let decorated = match &error.source {
             ErrSource::Constructing { source, .. } => source.clone(),
-            ErrSource::Module { name, .. } if self.composer.contains_module(name) => {
-                let composer = &self.composer;
-                crate::gate::no_panic(|| error.source.source(composer).into_owned())
-                    .unwrap_or_default()
-            }
-            ErrSource::Module { .. } => String::new(),
+            ErrSource::Module { name, .. } => match &self.composer {
+                Some(composer) if composer.contains_module(name) => {
+                    crate::gate::no_panic(|| error.source.source(composer).into_owned())
+                        .unwrap_or_default()
+                }
+                _ => String::new(),
+            },
         };
-        notes.retain(|note| *note != message && !note.is_empty());
+        let said = message.to_lowercase();
+        notes.retain(|note| {
+            const IDLE: [&str; 4] = [
+                "naga::ir::",
+                "see msg",
+                "unknown identifier",
+                "definition of",
+            ];
+            !said.contains(&note.to_lowercase()) && !IDLE.iter().any(|idle| note.starts_with(idle))
+        });
         let Some(offset) = offset else {
             let mut diag = Diag::whole_file(file, message);
             diag.notes = notes;
@@ -256,7 +294,7 @@ impl Linker {
             Place::Span(at) => (at & ((1 << 21) - 1)).saturating_sub(error.source.offset()),
             Place::Byte(at) => at,
         };
-        let (line, column) = original_place(&decorated, offset, original, head_lines);
+        let (line, column) = original_place(&decorated, offset, &scan.without_comments(original));
         let mut diag = Diag::new(file, line, column, line_at(original, line), message);
         diag.notes = notes;
         diag
@@ -284,6 +322,25 @@ impl Linker {
     }
 }
 
+/// A text as naga_oil wants it: one line with `enable` directives, then the rest. The other directives mean nothing to
+/// naga's IR; the composer puts them before what it writes.
+fn with_heads(scan: &Scan, body: &str) -> String {
+    let names: BTreeSet<&str> = scan
+        .heads
+        .iter()
+        .filter(|head| head.word == "enable")
+        .flat_map(|head| head.names.iter().map(|(name, _)| name.as_str()))
+        .collect();
+    let mut source = String::with_capacity(body.len() + 16);
+    if !names.is_empty() {
+        let names: Vec<&str> = names.into_iter().collect();
+        source.push_str(&format!("enable {};", names.join(", ")));
+    }
+    source.push('\n');
+    source.push_str(body);
+    source
+}
+
 /// The panic of a front end as a diagnostic.
 fn panicked(file: &str, message: &str) -> Diag {
     Diag::whole_file(file, format!("the WGSL front end panicked: {message}"))
@@ -299,7 +356,7 @@ enum Place {
 /// Message, notes and place of an error.
 fn describe(error: &ComposerErrorInner) -> (String, Vec<String>, Option<Place>) {
     use ComposerErrorInner as E;
-    let plain = |text: &str| demangle_text(text);
+    let plain = |text: &str| without_handles(&demangle_text(text));
     match error {
         E::WgslParseError(e) => {
             let mut labels = e.labels();
@@ -319,7 +376,15 @@ fn describe(error: &ComposerErrorInner) -> (String, Vec<String>, Option<Place>) 
         E::ShaderValidationError(e) | E::HeaderValidationError(e) => {
             let mut notes: Vec<String> = Vec::new();
             let mut message = plain(&e.as_inner().to_string());
-            let mut source = std::error::Error::source(e.as_inner());
+            if let naga::valid::ValidationError::EntryPoint {
+                source: naga::valid::EntryPointError::BindingCollision(_),
+                ..
+            } = e.as_inner()
+            {
+                message = "this variable has the group and binding of another one".into();
+            }
+            let mut source = std::error::Error::source(e.as_inner())
+                .filter(|_| !message.starts_with("this variable"));
             while let Some(inner) = source {
                 notes.push(std::mem::replace(&mut message, plain(&inner.to_string())));
                 source = inner.source();
@@ -357,6 +422,21 @@ fn describe(error: &ComposerErrorInner) -> (String, Vec<String>, Option<Place>) 
             Vec::new(),
             Some(Place::Byte(*pos)),
         ),
+        E::RedirectError(error) => {
+            use naga_oil::redirect::RedirectError as R;
+            let message = match error {
+                R::ArgumentMismatch(name, _) => format!(
+                    "`override fn {}` has other parameters than the virtual function",
+                    plain(name)
+                ),
+                R::ReturnTypeMismatch(name, _) => format!(
+                    "`override fn {}` has another result than the virtual function",
+                    plain(name)
+                ),
+                other => plain(&other.to_string()),
+            };
+            (message, Vec::new(), None)
+        }
         E::DecorationInSource(range) => (
             "`X_naga_oil_` is reserved for the linker".into(),
             Vec::new(),
@@ -380,7 +460,7 @@ fn describe(error: &ComposerErrorInner) -> (String, Vec<String>, Option<Place>) 
 
 /// Line and column in the original text of a byte in the text that naga_oil made of it. The lines are the same; within
 /// the line the n-th token is the same, however long the linker made it.
-fn original_place(decorated: &str, offset: usize, original: &str, head_lines: usize) -> (u32, u32) {
+fn original_place(decorated: &str, offset: usize, original: &str) -> (u32, u32) {
     let mut offset = offset.min(decorated.len());
     while !decorated.is_char_boundary(offset) {
         offset -= 1;
@@ -389,7 +469,7 @@ fn original_place(decorated: &str, offset: usize, original: &str, head_lines: us
     let start = decorated[..offset].rfind('\n').map_or(0, |n| n + 1);
     let decorated_line = decorated[start..].split('\n').next().unwrap_or("");
     let within = offset - start;
-    let number = (line + 1).saturating_sub(head_lines).max(1) as u32;
+    let number = (line + 1).saturating_sub(HEAD_LINES).max(1) as u32;
     let original_line = line_at(original, number);
 
     let before = line_tokens(decorated_line);
@@ -422,6 +502,7 @@ fn original_place(decorated: &str, offset: usize, original: &str, head_lines: us
         decorated_line
             .get(..within)
             .map_or(0, |text| text.chars().count())
+            .min(original_line.chars().count())
     };
     (number, column as u32 + 1)
 }
@@ -431,12 +512,21 @@ fn line_tokens(line: &str) -> Vec<(usize, usize)> {
     let scan = Scan::new(line);
     let mut tokens: Vec<(usize, usize)> = Vec::new();
     let mut join = false;
+    let mut before: Option<&Token> = None;
     for token in &scan.tokens {
         let text = &line[token.start..token.end];
         if token.kind == Kind::Directive {
             continue;
         }
-        if text == "::" || (join && token.kind == Kind::Ident) {
+        // A size becomes one word with what it touches.
+        let touches = before.is_some_and(|before| {
+            before.end == token.start
+                && (before.kind == Kind::Size || token.kind == Kind::Size)
+                && before.kind != Kind::Punct
+                && token.kind != Kind::Punct
+        });
+        before = Some(token);
+        if text == "::" || touches || (join && token.kind == Kind::Ident) {
             if let Some(last) = tokens.last_mut() {
                 last.1 = token.end;
             }
@@ -492,6 +582,26 @@ pub(crate) fn demangle_text(text: &str) -> String {
             .find(|c: char| !(c == '_' || c.is_ascii_alphanumeric()))
             .unwrap_or(tail.len());
         rest = &tail[end..];
+    }
+    out.push_str(rest);
+    out
+}
+
+/// A message of naga without the numbers of types and expressions, which nobody can look up.
+fn without_handles(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find(" Some([") {
+        let digits = rest[at + 7..]
+            .find(|c: char| !c.is_ascii_digit())
+            .map_or(rest.len(), |n| at + 7 + n);
+        if rest[digits..].starts_with("])") {
+            out.push_str(&rest[..at]);
+            rest = &rest[digits + 2..];
+        } else {
+            out.push_str(&rest[..at + 7]);
+            rest = &rest[at + 7..];
+        }
     }
     out.push_str(rest);
     out

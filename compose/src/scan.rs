@@ -194,6 +194,8 @@ pub struct Head {
     pub start: usize,
     /// Byte after the semicolon.
     pub end: usize,
+    /// It stands in a branch of a condition.
+    pub conditional: bool,
 }
 
 /// A fault of the text itself.
@@ -326,6 +328,7 @@ impl Scan {
         let mut at = 0;
         // Nothing but blanks and comments so far on this line.
         let mut line_start = true;
+        let mut quoted = false;
         while at < bytes.len() {
             let byte = bytes[at];
             if byte == b'\n' || byte == b'\r' {
@@ -375,7 +378,11 @@ impl Scan {
                     self.push(Kind::Number, at, end);
                     end
                 } else {
+                    // The one that closes needs no report of its own.
                     if byte == b'"' {
+                        quoted = !quoted;
+                    }
+                    if byte == b'"' && quoted {
                         self.fault(at, "a quotation mark is not WGSL");
                     }
                     let end = match &bytes[at..(at + 2).min(bytes.len())] {
@@ -583,7 +590,7 @@ impl Scan {
                         .push(format!(
                             "a flag is tested by `#ifdef {name}`, a size by `#if {name} == 2`"
                         ));
-                    return unreadable(name, at);
+                    return unreadable("", at);
                 }
             };
             let (negative, number) = match (words.get(3), words.get(4)) {
@@ -595,7 +602,7 @@ impl Scan {
                     after(words[2]),
                     format!("`#if {name} {op}` expects a whole number"),
                 );
-                return unreadable(name, at);
+                return unreadable("", at);
             };
             let digits = number.trim_end_matches(['u', 'i']);
             let Ok(value) = digits.parse::<i64>() else {
@@ -603,7 +610,7 @@ impl Scan {
                     number_at,
                     format!("`#if {name} {op}` expects a whole number, which `{number}` is not"),
                 );
-                return unreadable(name, at);
+                return unreadable("", at);
             };
             let rest = if negative { 5 } else { 4 };
             self.no_tail(text, words, rest);
@@ -786,6 +793,7 @@ impl Scan {
                         names,
                         start: token.start,
                         end,
+                        conditional: !depths.is_empty(),
                     });
                     doc_from = end;
                     i = j + 1;
@@ -926,18 +934,24 @@ impl Scan {
             .join("\n")
     }
 
-    /// The text with its comments blanked and its line breaks made `\n`: same lines, same columns.
+    /// The text with its comments and WGSL directives blanked and its line breaks made `\n`: same lines, same columns.
     pub fn without_comments(&self, text: &str) -> String {
         let mut out = String::with_capacity(text.len() + 1);
         let mut at = 0;
-        for &(start, end) in &self.comments {
-            push_normalized(&mut out, &text[at..start]);
+        let mut blanks: Vec<(usize, usize)> = self.comments.clone();
+        blanks.extend(self.heads.iter().map(|head| (head.start, head.end)));
+        blanks.sort_unstable();
+        for (start, end) in blanks {
+            if start < at {
+                continue;
+            }
+            out.push_str(&text[at..start]);
             for c in text[start..end].chars() {
                 out.push(if c == '\n' || c == '\r' { c } else { ' ' });
             }
             at = end;
         }
-        push_normalized(&mut out, &text[at..]);
+        out.push_str(&text[at..]);
         let mut out = out.replace("\r\n", "\n").replace('\r', "\n");
         if !out.ends_with('\n') {
             out.push('\n');
@@ -946,11 +960,18 @@ impl Scan {
     }
 
     /// The text for a given set of values: comments, conditions and what is switched off blanked, sizes inserted, WGSL
-    /// directives blanked. The lines stay; a size may shift the columns after it.
+    /// directives blanked. The lines stay; a size may shift the columns after it. Imports for which `is_plug_in` holds are
+    /// blanked too, and those that are active are returned by their paths.
     ///
     /// # Errors
     /// A size without a value, in an active place.
-    pub fn preprocess(&self, text: &str, defs: &Defs) -> Result<String, Fault> {
+    pub fn preprocess(
+        &self,
+        text: &str,
+        defs: &Defs,
+        is_plug_in: &dyn Fn(&Import) -> bool,
+    ) -> Result<(String, Vec<String>), Fault> {
+        let mut plug_ins = Vec::new();
         // Ranges to blank or to replace, in the order of the text.
         let mut edits: Vec<(usize, usize, Option<String>)> = self
             .comments
@@ -994,7 +1015,14 @@ impl Scan {
                     stack.pop();
                     edits.push((directive.start, directive.end, None));
                 }
-                DirectiveKind::Import(_) => {}
+                DirectiveKind::Import(imports) => {
+                    if imports.iter().any(is_plug_in) {
+                        edits.push((directive.start, directive.end, None));
+                        if outer {
+                            plug_ins.extend(imports.iter().map(Import::path));
+                        }
+                    }
+                }
                 DirectiveKind::ImportPath { .. } | DirectiveKind::Faulty => {
                     edits.push((directive.start, directive.end, None));
                 }
@@ -1052,7 +1080,7 @@ impl Scan {
             if start < at {
                 continue;
             }
-            push_normalized(&mut out, &text[at..start]);
+            out.push_str(&text[at..start]);
             match with {
                 Some(with) => out.push_str(&with),
                 None => {
@@ -1063,12 +1091,12 @@ impl Scan {
             }
             at = end;
         }
-        push_normalized(&mut out, &text[at..]);
+        out.push_str(&text[at..]);
         let mut out = out.replace("\r\n", "\n").replace('\r', "\n");
         if !out.ends_with('\n') {
             out.push('\n');
         }
-        Ok(out)
+        Ok((out, plug_ins))
     }
 }
 
@@ -1095,10 +1123,6 @@ impl Test {
             }
         }
     }
-}
-
-fn push_normalized(out: &mut String, text: &str) {
-    out.push_str(text);
 }
 
 /// The name in `#{NAME}`.

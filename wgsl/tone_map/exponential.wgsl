@@ -13,7 +13,7 @@ const BELOW_ONE: f32 = 0.99999994;
 /// domain  color in [1e-6, 1e6] 1 log
 /// domain  exposure in [1e-3, 1e3] 1 log
 /// range   [0, 0.99999994] 1
-/// error   5e-7 rel of reference::tone_map::exponential
+/// error   6e-7 rel of reference::tone_map::exponential
 /// monotone color
 /// source  Leitner2022 ch. 5.6
 fn exponential(color: vec3<f32>, exposure: f32) -> vec3<f32> {

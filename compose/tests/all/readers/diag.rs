@@ -49,5 +49,8 @@ fn the_nearest_name_is_found_and_a_far_one_is_not() {
     assert_eq!(nearest("SNWO", names), Some("SNOW"));
     assert_eq!(nearest("PENGUIN", names), None);
     assert_eq!(nearest("", names), None);
+    assert_eq!(nearest("k", ["h"]), None);
+    assert_eq!(nearest("H", ["k", "h"]), Some("h"));
+    assert_eq!(nearest("hh", ["h"]), Some("h"));
     assert_eq!(nearest(&"x".repeat(100_000), names), None);
 }
