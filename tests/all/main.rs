@@ -13,3 +13,4 @@ mod phase;
 mod planet;
 mod terrain;
 mod tone_map;
+mod twins;
