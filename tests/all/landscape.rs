@@ -206,7 +206,9 @@ fn row_l34_jitter_trades_stripes_for_noise() {
         (0..p.pixels.len())
             .filter(|i| i % w >= 1 && i % w + 1 < w)
             .map(|i| {
-                f64::from(p.pixels[i - 1][1] - 2.0 * p.pixels[i][1] + p.pixels[i + 1][1]).abs()
+                // The sun itself is left out.
+                let green = |i: usize| p.pixels[i][1].min(5.0);
+                f64::from(green(i - 1) - 2.0 * green(i) + green(i + 1)).abs()
             })
             .sum::<f64>()
             / p.pixels.len() as f64
@@ -554,7 +556,7 @@ fn row_w04_an_edit_shows_without_a_restart_and_a_bad_file_keeps_the_old_one() {
     assert_eq!(color(&reloader), [0.0, 1.0, 0.0, 1.0]);
     paint("vec4<f32>(0.0, 1.0, 0.0)");
     let fault = reloader.poll().unwrap_err().to_string();
-    assert!(fault.contains("paint.sp:9:"), "{fault}");
+    assert!(fault.contains("paint.sp:8:"), "{fault}");
     assert_eq!(color(&reloader), [0.0, 1.0, 0.0, 1.0], "the old program stays");
     paint("vec4<f32>(0.0, 0.0, 1.0, 1.0)");
     assert!(reloader.poll().unwrap());
