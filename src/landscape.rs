@@ -1,0 +1,432 @@
+//! The whole landscape in one fragment program: the textbook picture.
+
+use glam::Vec3;
+
+use crate::error::Error;
+use crate::program::{PipelineOptions, ProgramSet, ReadyPipeline, Value};
+use crate::programs::{Anchors, View as ViewBlock};
+use crate::settings::{Preset, Settings};
+use crate::view::{View, WorldPos};
+
+/// How depth grows in the host's depth buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Depth {
+    /// 0 near, 1 far.
+    Normal,
+    /// 1 near, 0 at a finite far plane.
+    Reversed,
+    /// 1 near, 0 at infinity.
+    #[default]
+    ReversedInfinite,
+}
+
+/// How the host projects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Projection {
+    /// Rays from one point.
+    #[default]
+    Perspective,
+    /// Parallel rays.
+    Orthographic,
+}
+
+/// What the host's render pass draws into.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Targets {
+    /// Format of the colour target. Formats ending in `Srgb` get linear display colour, other integer formats encoded
+    /// display colour, float formats scene radiance.
+    pub color_format: wgpu::TextureFormat,
+    /// Format of the pass's depth buffer, if it has one.
+    pub depth_format: Option<wgpu::TextureFormat>,
+    /// Samples a pixel of the pass, at least 1.
+    pub sample_count: u32,
+    /// How depth grows.
+    pub depth: Depth,
+    /// How the host projects.
+    pub projection: Projection,
+}
+
+impl Default for Targets {
+    fn default() -> Self {
+        Targets {
+            color_format: wgpu::TextureFormat::Rgba8UnormSrgb,
+            depth_format: None,
+            sample_count: 1,
+            depth: Depth::default(),
+            projection: Projection::default(),
+        }
+    }
+}
+
+/// What a phase of a frame did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[must_use]
+pub struct Work {
+    /// Tables computed anew.
+    pub bakes: u32,
+    /// Compute dispatches recorded.
+    pub dispatches: u32,
+    /// Draw calls recorded.
+    pub draws: u32,
+    /// Bytes uploaded.
+    pub bytes: u64,
+}
+
+/// Choices that are made once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LandscapeOptions {
+    /// The quality.
+    pub preset: Preset,
+    /// The scene by its file name without the ending.
+    pub scene: String,
+    /// Values that go before those of scene and preset.
+    pub values: Vec<(String, Value)>,
+}
+
+impl Default for LandscapeOptions {
+    fn default() -> Self {
+        LandscapeOptions {
+            preset: Preset::default(),
+            scene: "thesis".to_owned(),
+            values: Vec::new(),
+        }
+    }
+}
+
+/// Draws terrain, sky and clouds over the whole target.
+///
+/// ```no_run
+/// # fn frame(device: &wgpu::Device, queue: &wgpu::Queue, encoder: &mut wgpu::CommandEncoder, target: &wgpu::TextureView)
+/// # -> Result<(), veduta::Error> {
+/// let targets = veduta::Targets::default();
+/// let mut landscape = veduta::Landscape::new(device, veduta::programs(), &targets, &Default::default())?;
+/// let work = landscape.prepare(device, queue, encoder, &veduta::View::default())?;
+/// println!("{} bytes uploaded", work.bytes);
+/// let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+///     color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+///         view: target, depth_slice: None, resolve_target: None, ops: wgpu::Operations::default(),
+///     })],
+///     ..Default::default()
+/// });
+/// landscape.composite(&mut pass);
+/// # Ok(()) }
+/// ```
+#[derive(Debug)]
+pub struct Landscape {
+    settings: Settings,
+    programs: ProgramSet,
+    pipeline: wgpu::RenderPipeline,
+    content_layout: crate::program::StructLayout,
+    blocks: [Block; 3],
+    groups: [wgpu::BindGroup; 2],
+    frame: u32,
+}
+
+/// A uniform buffer that is written only when its bytes have changed.
+#[derive(Debug)]
+struct Block {
+    buffer: wgpu::Buffer,
+    bytes: Vec<u8>,
+}
+
+impl Block {
+    fn new(device: &wgpu::Device, label: &str, size: u64) -> Block {
+        Block {
+            buffer: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            bytes: Vec::new(),
+        }
+    }
+
+    fn update(&mut self, queue: &wgpu::Queue, bytes: &[u8]) -> u64 {
+        if self.bytes == bytes {
+            return 0;
+        }
+        queue.write_buffer(&self.buffer, 0, bytes);
+        self.bytes = bytes.to_vec();
+        bytes.len() as u64
+    }
+}
+
+/// What the program writes for a colour format: the value of the override `OUTPUT`.
+fn output_of(format: wgpu::TextureFormat) -> Result<f64, Error> {
+    if format.is_depth_stencil_format()
+        || format.is_compressed()
+        || format.components() < 3
+        || matches!(
+            format.sample_type(None, None),
+            Some(wgpu::TextureSampleType::Uint | wgpu::TextureSampleType::Sint) | None
+        )
+    {
+        return Err(Error::OutOfDomain {
+            name: "targets.color_format".to_owned(),
+            value: format!("{format:?}"),
+            domain: "a colour format with at least three channels that a shader writes as floats".to_owned(),
+        });
+    }
+    Ok(if format.is_srgb() {
+        1.0
+    } else if matches!(
+        format,
+        wgpu::TextureFormat::Rgba16Float
+            | wgpu::TextureFormat::Rgba32Float
+            | wgpu::TextureFormat::Rg11b10Ufloat
+    ) {
+        2.0
+    } else {
+        0.0
+    })
+}
+
+impl Landscape {
+    /// Builds the pipeline and its parameter blocks.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for a target that it cannot draw into; the faults of [`Settings::resolve`],
+    /// [`ProgramSet::get`] and [`crate::program::ComposedProgram::pipeline`].
+    pub fn new(
+        device: &wgpu::Device,
+        programs: &ProgramSet,
+        targets: &Targets,
+        options: &LandscapeOptions,
+    ) -> Result<Landscape, Error> {
+        if targets.projection == Projection::Orthographic {
+            return Err(Error::OutOfDomain {
+                name: "targets.projection".to_owned(),
+                value: "Orthographic".to_owned(),
+                domain: "Perspective: the landscape is drawn from one eye".to_owned(),
+            });
+        }
+        if !matches!(targets.sample_count, 1 | 2 | 4 | 8 | 16) {
+            return Err(Error::OutOfDomain {
+                name: "targets.sample_count".to_owned(),
+                value: targets.sample_count.to_string(),
+                domain: "1, 2, 4, 8 or 16".to_owned(),
+            });
+        }
+        let output = output_of(targets.color_format)?;
+        let settings = Settings::resolve(
+            programs,
+            &options.preset,
+            Some(&options.scene),
+            &options.values,
+        )?;
+        let scene = programs.scene(&options.scene)?;
+        let program = programs.get(&scene.program, &settings.features())?;
+        let constants: Vec<(&str, f64)> = program
+            .overrides
+            .iter()
+            .filter_map(|o| {
+                let value = if o.name == "OUTPUT" {
+                    Some(output)
+                } else {
+                    settings.number(&o.name)
+                };
+                Some((o.name.as_ref(), value?))
+            })
+            .collect();
+        let ReadyPipeline {
+            pipeline,
+            bind_group_layouts,
+        } = program.pipeline(
+            device,
+            &PipelineOptions {
+                targets: &[Some(targets.color_format.into())],
+                depth_stencil: targets.depth_format.map(|format| wgpu::DepthStencilState {
+                    format,
+                    depth_write_enabled: Some(false),
+                    depth_compare: Some(wgpu::CompareFunction::Always),
+                    stencil: Default::default(),
+                    bias: Default::default(),
+                }),
+                sample_count: targets.sample_count,
+                constants: &constants,
+                ..Default::default()
+            },
+        )?;
+        let (crate::program::Pipeline::Render(pipeline), [view_layout, content_group_layout]) =
+            (pipeline, bind_group_layouts.as_slice())
+        else {
+            return Err(Error::MissingStage {
+                program: program.program.to_string(),
+            });
+        };
+        let content_layout = program
+            .layout("Content")
+            .ok_or_else(|| Error::MissingStage {
+                program: program.program.to_string(),
+            })?
+            .clone();
+        let blocks = [
+            Block::new(device, "veduta view", ViewBlock::SIZE as u64),
+            Block::new(device, "veduta content", u64::from(content_layout.size)),
+            Block::new(device, "veduta anchors", Anchors::SIZE as u64),
+        ];
+        let group = |layout, blocks: &[&Block]| {
+            let entries: Vec<wgpu::BindGroupEntry<'_>> = blocks
+                .iter()
+                .zip(0..)
+                .filter(|(_, binding)| {
+                    program
+                        .bindings
+                        .iter()
+                        .any(|b| b.group == u32::from(blocks.len() > 1) && b.binding == *binding)
+                })
+                .map(|(block, binding)| wgpu::BindGroupEntry {
+                    binding,
+                    resource: block.buffer.as_entire_binding(),
+                })
+                .collect();
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("veduta landscape"),
+                layout,
+                entries: &entries,
+            })
+        };
+        let groups = [
+            group(view_layout, &[&blocks[0]]),
+            group(content_group_layout, &[&blocks[1], &blocks[2]]),
+        ];
+        Ok(Landscape {
+            settings,
+            programs: programs.clone(),
+            pipeline,
+            content_layout,
+            blocks,
+            groups,
+            frame: 0,
+        })
+    }
+
+    /// The resolved values.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The pipeline; it is the same object for as long as the landscape lives.
+    pub fn pipeline(&self) -> &wgpu::RenderPipeline {
+        &self.pipeline
+    }
+
+    /// Gives a content key a value; the next [`Landscape::prepare`] uploads it. No pipeline is made.
+    ///
+    /// # Errors
+    /// [`Error::UnknownKey`], [`Error::WrongType`], [`Error::OutOfDomain`]; a quality key needs a new `Landscape`.
+    pub fn set_content(&mut self, name: &str, value: Value) -> Result<(), Error> {
+        if self.programs.key(name)?.kind != crate::program::KeyKind::Content {
+            return Err(Error::WrongType {
+                name: name.to_owned(),
+                value: value.to_string(),
+                expected: "content; a quality key is given to `Landscape::new`".to_owned(),
+            });
+        }
+        self.settings.set(&self.programs, name, value)
+    }
+
+    fn anchors(&self, eye: WorldPos) -> Result<Anchors, Error> {
+        let foot = WorldPos {
+            cell: glam::I64Vec3::new(eye.cell.x, 0, eye.cell.z),
+            frac: Vec3::new(eye.frac.x, 0.0, eye.frac.z),
+        };
+        let number = |name: &str| self.settings.number(name).unwrap_or(1.0);
+        let place = |name: &str| -> Result<([i32; 3], [f32; 3]), Error> {
+            let wavelength = number(name);
+            let mut cell = [0; 3];
+            let mut frac = [0.0; 3];
+            for axis in 0..3 {
+                let at = foot.lattice(axis, wavelength)?;
+                cell[axis] = at.cell;
+                frac[axis] = at.frac;
+            }
+            Ok((cell, frac))
+        };
+        let (terrain_cell, terrain_frac) = place("TERRAIN_SCALE")?;
+        let (rock_cell, rock_frac) = place("ROCK_SCALE")?;
+        let (cloud_cell, cloud_frac) = place("CLOUD_SCALE")?;
+        Ok(Anchors {
+            terrain_cell: [terrain_cell[0], terrain_cell[2]],
+            terrain_frac: [terrain_frac[0], terrain_frac[2]],
+            rock_cell,
+            rock_frac,
+            cloud_cell,
+            cloud_frac,
+            ..Default::default()
+        })
+    }
+
+    /// Uploads what has changed since the last call.
+    ///
+    /// Nothing is submitted; `encoder` is the one that the pass of [`Landscape::composite`] is recorded in.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] that names the field of the view, its value and what is allowed.
+    pub fn prepare(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        view: &View,
+    ) -> Result<Work, Error> {
+        // The textbook picture has no tables, so that nothing is recorded ahead of the pass.
+        let _ = (device, encoder);
+        view.check()?;
+        let altitude = view.eye.altitude();
+        if !(-1e4..=1e8).contains(&altitude) {
+            return Err(Error::OutOfDomain {
+                name: "view.eye altitude".to_owned(),
+                value: format!("{altitude} m"),
+                domain: "in [-10000, 1e8] m".to_owned(),
+            });
+        }
+        let [ray_middle, ray_right, ray_up] = view.rays()?.map(|v| v.to_array());
+        let block = ViewBlock {
+            ray_middle,
+            eye_altitude: altitude as f32,
+            ray_right,
+            exposure: view.exposure,
+            ray_up,
+            sun_angular_radius: view.sun.angular_radius,
+            to_sun: view.sun.to_light.normalize().to_array(),
+            frame: self.frame,
+            sun_irradiance: view.sun.irradiance.to_array(),
+            jitter: view.jitter.to_array(),
+            ..Default::default()
+        };
+        let content = self
+            .settings
+            .uniform_bytes(&self.programs, &self.content_layout)?;
+        let anchors = self.anchors(view.eye)?;
+        let [view_block, content_block, anchor_block] = &mut self.blocks;
+        let bytes = view_block.update(queue, &block.to_bytes())
+            + content_block.update(queue, &content)
+            + anchor_block.update(queue, &anchors.to_bytes());
+        Ok(Work {
+            bytes,
+            ..Default::default()
+        })
+    }
+
+    /// Sets the number that seeds the step jitter; give each frame its own to make the noise change.
+    pub fn set_frame(&mut self, frame: u32) {
+        self.frame = frame;
+    }
+
+    /// Draws over every pixel of the pass.
+    pub fn composite(&self, pass: &mut wgpu::RenderPass<'_>) -> Work {
+        pass.set_pipeline(&self.pipeline);
+        for (i, group) in self.groups.iter().enumerate() {
+            pass.set_bind_group(i as u32, group, &[]);
+        }
+        pass.draw(0..3, 0..1);
+        Work {
+            draws: 1,
+            ..Default::default()
+        }
+    }
+}
