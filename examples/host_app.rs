@@ -1,25 +1,22 @@
-//! A host application without a window: it owns the device, the texture, the encoder and the pass, and lets veduta draw
-//! the landscape into them.
-//!
-//!     cargo run --release --example host_app
+//! A host application without a window: it owns the device, the texture, the encoder and the pass; veduta draws the
+//! landscape into them. Run it with `cargo run --release --example host_app`.
 
 use veduta::{Landscape, LandscapeOptions, Preset, Targets, View, wgpu};
 
-const SIZE: wgpu::Extent3d = wgpu::Extent3d {
-    width: 128,
-    height: 72,
-    depth_or_array_layers: 1,
-};
+const WIDTH: u32 = 128;
+const HEIGHT: u32 = 72;
 
-/// Draws one frame and returns the mean of red, green and blue, each in [0, 255].
-pub fn draw() -> Result<[f64; 3], Box<dyn std::error::Error>> {
+/// Draws one frame and returns its pixels: red, green, blue and alpha, row by row.
+pub fn draw() -> Result<Vec<u8>, Box<dyn std::error::Error>> {
     // What a host has anyway: a device with its queue, and something to draw into.
-    let instance = wgpu::Instance::default();
-    let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
-    let (device, queue) = pollster::block_on(adapter.request_device(&Default::default()))?;
-    let texture = device.create_texture(&wgpu::TextureDescriptor {
+    let gpu = pollster::block_on(veduta::device::Gpu::open())?;
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("picture"),
-        size: SIZE,
+        size: wgpu::Extent3d {
+            width: WIDTH,
+            height: HEIGHT,
+            depth_or_array_layers: 1,
+        },
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
@@ -28,7 +25,7 @@ pub fn draw() -> Result<[f64; 3], Box<dyn std::error::Error>> {
         view_formats: &[],
     });
 
-    // Once: the pipeline for the host's target.
+    // Once: the landscape, with the pipeline for the host's target. The defaults are the scene and preset `thesis`.
     let targets = Targets {
         color_format: texture.format(),
         ..Default::default()
@@ -37,66 +34,46 @@ pub fn draw() -> Result<[f64; 3], Box<dyn std::error::Error>> {
         preset: Preset::ThesisLow,
         ..Default::default()
     };
-    let mut landscape = Landscape::new(&device, veduta::programs(), &targets, &options)?;
+    let mut landscape = Landscape::new(&gpu.device, veduta::programs(), &targets, &options)?;
 
-    // Each frame: a view, then `prepare` and `composite` between the host's own commands.
+    // Each frame: `prepare` uploads what has changed, `composite` draws in the host's own pass.
     let mut view = View::default();
-    view.look(0.5, 0.1, 1.0, SIZE.width as f32 / SIZE.height as f32);
-    let mut encoder = device.create_command_encoder(&Default::default());
-    let uploaded = landscape.prepare(&device, &queue, &mut encoder, &view)?;
-    println!("{} bytes uploaded", uploaded.bytes);
+    view.look(0.5, 0.1, 1.0, WIDTH as f32 / HEIGHT as f32);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let uploaded = landscape.prepare(&gpu.device, &gpu.queue, &mut encoder, &view)?;
     let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         color_attachments: &[Some(wgpu::RenderPassColorAttachment {
             view: &texture.create_view(&Default::default()),
             depth_slice: None,
             resolve_target: None,
-            ops: wgpu::Operations::default(),
+            ops: Default::default(),
         })],
         ..Default::default()
     });
     let drawn = landscape.composite(&mut pass);
-    println!("{} draw call", drawn.draws);
     drop(pass);
+    println!("{} bytes, {} draw call", uploaded.bytes, drawn.draws);
 
-    // The rest reads the picture back, as a test or a tool would; a host with a window presents instead.
-    let row = 4 * SIZE.width;
-    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+    // A host with a window presents now; this one reads the picture back.
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("picture"),
-        size: u64::from(row * SIZE.height),
+        size: u64::from(4 * WIDTH * HEIGHT),
         usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
         mapped_at_creation: false,
     });
-    let layout = wgpu::TexelCopyBufferLayout {
-        offset: 0,
-        bytes_per_row: Some(row),
-        rows_per_image: None,
-    };
-    encoder.copy_texture_to_buffer(
-        texture.as_image_copy(),
-        wgpu::TexelCopyBufferInfo {
-            buffer: &buffer,
-            layout,
+    let rows = wgpu::TexelCopyBufferInfo {
+        buffer: &buffer,
+        layout: wgpu::TexelCopyBufferLayout {
+            bytes_per_row: Some(4 * WIDTH),
+            ..Default::default()
         },
-        SIZE,
-    );
-    queue.submit([encoder.finish()]);
-    buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
-    device.poll(wgpu::PollType::wait_indefinitely())?;
-    let picture = buffer.slice(..).get_mapped_range()?.to_vec();
-    let pixels = f64::from(SIZE.width * SIZE.height);
-    Ok([0, 1, 2].map(|c| {
-        picture
-            .iter()
-            .skip(c)
-            .step_by(4)
-            .map(|b| f64::from(*b))
-            .sum::<f64>()
-            / pixels
-    }))
+    };
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), rows, texture.size());
+    gpu.queue.submit([encoder.finish()]);
+    Ok(gpu.read_staging(&buffer)?)
 }
 
-#[allow(dead_code)] // The tests call `draw`.
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    println!("mean colour {:.1?}", draw()?);
+    println!("{} bytes of pixels", draw()?.len());
     Ok(())
 }

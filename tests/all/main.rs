@@ -1,0 +1,5 @@
+//! Every test that needs more than one module.
+
+mod downstream;
+mod examples;
+mod validators;
