@@ -200,6 +200,9 @@ fn spirv_val_rejects_a_corrupted_word() {
     let at = words.iter().rposition(|w| *w == OP_FUNCTION).unwrap();
     words[at + 1] = words[3] + 1;
     let output = spirv_val(&file, &words);
-    assert!(!output.status.success(), "{name}: the corrupted word went unnoticed");
+    assert!(
+        !output.status.success(),
+        "{name}: the corrupted word went unnoticed"
+    );
     assert!(shown(&output).contains("error"), "{}", shown(&output));
 }
