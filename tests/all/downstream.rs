@@ -128,14 +128,16 @@ fn plain(path: &Path) -> String {
     plain.display().to_string().replace('\\', "/")
 }
 
-/// A manifest whose path dependencies name the folders that they named from `home`.
+/// A manifest whose path dependencies name by absolute paths the folders that they named from `home`.
 fn with_absolute_paths(manifest: &str, home: &Path) -> String {
     const KEY: &str = "path = \"";
     let mut text = String::new();
     let mut rest = manifest;
     while let Some((before, after)) = rest.split_once(KEY) {
         let (path, after) = after.split_once('"').unwrap();
-        text += &format!("{before}{KEY}{}\"", plain(&home.join(path)));
+        let folder = home.join(path);
+        let path = if folder.is_dir() { plain(&folder) } else { path.to_owned() };
+        text += &format!("{before}{KEY}{path}\"");
         rest = after;
     }
     text + rest
