@@ -18,9 +18,9 @@ fn raise(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= arrayLength(&heights) {
         return;
     }
-    let sample = vec2<u32>(id.x % ROW, id.x / ROW);
-    let cell = vec2<i32>(sample / HILL);
-    let frac = vec2<f32>(sample % HILL) / f32(HILL);
+    let place = vec2<u32>(id.x % ROW, id.x / ROW);
+    let cell = vec2<i32>(place / HILL);
+    let frac = vec2<f32>(place % HILL) / f32(HILL);
     heights[id.x] = 0.75 * gradient_noise_2d(cell, frac, 7u);
 }
     }#

@@ -14,10 +14,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // The composed program: plain WGSL, and what it binds.
     let program = programs::programs().get("hills", &[])?;
     for stage in program.stages.iter() {
-        println!("{:?} stage: {} bytes of WGSL", stage.stage, stage.wgsl.len());
+        println!(
+            "{:?} stage: {} bytes of WGSL",
+            stage.stage,
+            stage.wgsl.len()
+        );
     }
     for b in program.bindings.iter() {
-        println!("group {} binding {}: {} {:?}", b.group, b.binding, b.name, b.ty);
+        println!(
+            "group {} binding {}: {} {:?}",
+            b.group, b.binding, b.name, b.ty
+        );
     }
 
     // Its pipeline, with everything else as in any wgpu program.
