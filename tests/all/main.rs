@@ -2,4 +2,5 @@
 
 mod downstream;
 mod examples;
+mod getting_started;
 mod validators;
