@@ -84,6 +84,52 @@ impl Gpu {
         self.read_staging(&staging)
     }
 
+    /// Reads the first mip level of a 2D texture that has `COPY_SRC` usage, rows packed tightly from the top, blocking
+    /// until the device has finished.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when the device is lost, [`Error::OutOfDomain`] for a format without a fixed size of a texel.
+    pub fn read_texture(&self, texture: &wgpu::Texture) -> Result<Vec<u8>, Error> {
+        let Some(texel) = texture.format().block_copy_size(None) else {
+            return Err(Error::OutOfDomain {
+                name: "texture.format".to_owned(),
+                value: format!("{:?}", texture.format()),
+                domain: "a colour format".to_owned(),
+            });
+        };
+        let packed = texture.width() * texel;
+        let stride = packed.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read back"),
+            size: u64::from(stride) * u64::from(texture.height()),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &staging,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(stride),
+                    rows_per_image: None,
+                },
+            },
+            wgpu::Extent3d {
+                depth_or_array_layers: 1,
+                ..texture.size()
+            },
+        );
+        self.queue.submit([encoder.finish()]);
+        let padded = self.read_staging(&staging)?;
+        Ok(padded
+            .chunks_exact(stride as usize)
+            .flat_map(|row| &row[..packed as usize])
+            .copied()
+            .collect())
+    }
+
     /// Reads a buffer that has `MAP_READ` usage, blocking until the device has finished.
     ///
     /// # Errors
@@ -109,4 +155,19 @@ impl Gpu {
         staging.unmap();
         Ok(data)
     }
+}
+
+#[cfg(feature = "compose")]
+static SHARED: std::sync::OnceLock<Result<Gpu, Error>> = std::sync::OnceLock::new();
+
+/// One device for everything in this process that needs no device of its own, opened at the first call.
+///
+/// # Errors
+/// As [`Gpu::open`]; the first answer holds for all calls.
+#[cfg(feature = "compose")]
+pub fn shared() -> Result<&'static Gpu, Error> {
+    SHARED
+        .get_or_init(|| pollster::block_on(Gpu::open()))
+        .as_ref()
+        .map_err(Clone::clone)
 }

@@ -134,7 +134,9 @@ pub enum Error {
         available: u64,
     },
     /// No adapter answers.
-    #[error("no graphics adapter was found: {why}; on Debian or Ubuntu install one with `apt-get install mesa-vulkan-drivers`")]
+    #[error(
+        "no graphics adapter was found: {why}; on Debian or Ubuntu install one with `apt-get install mesa-vulkan-drivers`"
+    )]
     NoAdapter {
         /// What the request said.
         why: String,

@@ -199,6 +199,7 @@ impl Evaluator {
                     text,
                     file: "expression",
                     defs: &defs,
+                    plug_ins: &[],
                 })
                 .map_err(|e| Error::Compose(e.to_string()))
         };
@@ -218,8 +219,9 @@ impl Evaluator {
             let _ = writeln!(store, "    eval_results[base + {j}u] = {bits};");
         }
         let module = link(&source(spec, &store, width))?;
-        let wgsl = veduta_compose::compose::finish(module)
-            .map_err(|e| Error::Compose(e.to_string()))?;
+        let wgsl = veduta_compose::compose::finish(module, naga::valid::Capabilities::empty())
+            .map_err(Error::Compose)?
+            .wgsl;
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let shader = gpu
             .device

@@ -309,6 +309,11 @@ impl Landscape {
         &self.settings
     }
 
+    /// The pipeline; it is the same object for as long as the landscape lives.
+    pub fn pipeline(&self) -> &wgpu::RenderPipeline {
+        &self.pipeline
+    }
+
     /// Gives a content key a value; the next [`Landscape::prepare`] uploads it. No pipeline is made.
     ///
     /// # Errors

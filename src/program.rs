@@ -276,7 +276,10 @@ impl ProgramSet {
             .find(|k| k.name == name)
             .ok_or_else(|| Error::UnknownKey {
                 name: name.to_owned(),
-                nearest: crate::error::nearest_name(name, self.keys.iter().map(|k| k.name.as_ref())),
+                nearest: crate::error::nearest_name(
+                    name,
+                    self.keys.iter().map(|k| k.name.as_ref()),
+                ),
             })
     }
 
@@ -571,8 +574,9 @@ impl ComposedProgram {
                     count: options.sample_count,
                     ..Default::default()
                 },
-                fragment: fragment.as_ref().map(|(module, entry, constants)| {
-                    wgpu::FragmentState {
+                fragment: fragment
+                    .as_ref()
+                    .map(|(module, entry, constants)| wgpu::FragmentState {
                         module,
                         entry_point: Some(&entry.name),
                         compilation_options: wgpu::PipelineCompilationOptions {
@@ -580,8 +584,7 @@ impl ComposedProgram {
                             ..Default::default()
                         },
                         targets: options.targets,
-                    }
-                }),
+                    }),
                 multiview_mask: None,
                 cache: None,
             });

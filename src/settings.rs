@@ -244,8 +244,12 @@ impl Settings {
             let words: Vec<[u8; 4]> = match (member.ty.as_ref(), value) {
                 ("f32", Value::Float(v)) => vec![(v as f32).to_le_bytes()],
                 ("f32", Value::Int(v)) => vec![(v as f32).to_le_bytes()],
-                ("i32", Value::Int(v)) => vec![i32::try_from(v).map_err(|_| wrong())?.to_le_bytes()],
-                ("u32", Value::Int(v)) => vec![u32::try_from(v).map_err(|_| wrong())?.to_le_bytes()],
+                ("i32", Value::Int(v)) => {
+                    vec![i32::try_from(v).map_err(|_| wrong())?.to_le_bytes()]
+                }
+                ("u32", Value::Int(v)) => {
+                    vec![u32::try_from(v).map_err(|_| wrong())?.to_le_bytes()]
+                }
                 ("vec3<f32>", Value::Vec3(v)) => {
                     v.iter().map(|x| (*x as f32).to_le_bytes()).collect()
                 }

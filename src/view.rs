@@ -189,7 +189,11 @@ impl Default for View {
 
 /// Reversed, infinite perspective with the near plane at 0.1 m.
 pub fn perspective(vertical_field_of_view: f32, aspect: f32) -> Mat4 {
-    glam::camera::rh::proj::directx::perspective_infinite_reverse(vertical_field_of_view, aspect, 0.1)
+    glam::camera::rh::proj::directx::perspective_infinite_reverse(
+        vertical_field_of_view,
+        aspect,
+        0.1,
+    )
 }
 
 /// Unit vector with this height above the horizon and this azimuth clockwise from -Z, both in radians.
@@ -224,9 +228,7 @@ impl View {
         if !self.eye.frac.is_finite() {
             return fault("view.eye.frac", self.eye.frac.to_string(), "finite");
         }
-        if !self.world_from_view.is_finite()
-            || self.world_from_view.determinant().abs() < 1e-6
-        {
+        if !self.world_from_view.is_finite() || self.world_from_view.determinant().abs() < 1e-6 {
             return fault(
                 "view.world_from_view",
                 format!("{:?}", self.world_from_view.to_cols_array()),
@@ -377,7 +379,8 @@ mod tests {
         }
         let forward = direction(0.2, 0.3).as_vec3();
         assert!((infinite[0].normalize() - forward).length() < 1e-6);
-        view.projection = glam::camera::rh::proj::directx::orthographic(-1.0, 1.0, -1.0, 1.0, 0.0, 10.0);
+        view.projection =
+            glam::camera::rh::proj::directx::orthographic(-1.0, 1.0, -1.0, 1.0, 0.0, 10.0);
         assert!(view.rays().is_err());
     }
 }

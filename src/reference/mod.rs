@@ -1,1 +1,14 @@
 //! The f64 twins of the module functions, written from the formulas.
+
+pub mod atmosphere;
+pub mod clouds;
+pub mod fractal;
+pub mod hash;
+pub mod math;
+pub mod medium;
+pub mod noise;
+pub mod phase;
+pub mod planet;
+pub mod post;
+pub mod terrain;
+pub mod tone_map;

@@ -1,6 +1,13 @@
-//! Every test that needs more than one module.
+//! Every test of the library that runs on the device or builds something, in one binary.
 
+mod accuracy;
+mod atmosphere;
+mod common;
 mod downstream;
+mod eval;
 mod examples;
 mod getting_started;
+mod phase;
+mod planet;
+mod tone_map;
 mod validators;

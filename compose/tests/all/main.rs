@@ -1,0 +1,7 @@
+//! All tests of the composer in one binary.
+
+mod emit;
+mod faults;
+mod fuzz;
+mod link;
+mod readers;

@@ -1,0 +1,268 @@
+//! Lattices, value noise and gradient noise: the twins of `veduta::noise`.
+//!
+//! Written as the definition says: a sum over the 2^n corners of a cell, each weighted by a product of fades.
+
+use super::hash::{lattice_hash_2d, lattice_hash_3d, unit_float};
+
+/// A position on a 2D lattice, `cell + frac`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lattice2d {
+    /// The lattice point below.
+    pub cell: [i32; 2],
+    /// The rest, in [0, 1).
+    pub frac: [f64; 2],
+}
+
+/// A position on a 3D lattice, `cell + frac`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lattice3d {
+    /// The lattice point below.
+    pub cell: [i32; 3],
+    /// The rest, in [0, 1).
+    pub frac: [f64; 3],
+}
+
+/// `cell * 2^i + whole`, wrapped at 2^32.
+fn refine(cell: i32, i: i32, whole: f64) -> i32 {
+    let exact = (i64::from(cell) << i) + whole as i64;
+    // The low 32 bits are the wrapped cell.
+    exact as i32
+}
+
+fn place<const N: usize>(
+    cell: [i32; N],
+    frac: [f64; N],
+    i: i32,
+    shift: [f64; N],
+) -> ([i32; N], [f64; N]) {
+    let position: [f64; N] =
+        std::array::from_fn(|axis| frac[axis] * octave_frequency(i) + shift[axis]);
+    (
+        std::array::from_fn(|axis| refine(cell[axis], i, position[axis].floor())),
+        position.map(|p| p - p.floor()),
+    )
+}
+
+/// Moves the whole cells of the fraction into the cell.
+pub fn split_2d(cell: [i32; 2], frac: [f64; 2]) -> Lattice2d {
+    let (cell, frac) = place(cell, frac, 0, [0.0; 2]);
+    Lattice2d { cell, frac }
+}
+
+/// Moves the whole cells of the fraction into the cell.
+pub fn split_3d(cell: [i32; 3], frac: [f64; 3]) -> Lattice3d {
+    let (cell, frac) = place(cell, frac, 0, [0.0; 3]);
+    Lattice3d { cell, frac }
+}
+
+/// 2^i.
+pub fn octave_frequency(i: i32) -> f64 {
+    2_f64.powi(i)
+}
+
+/// The seed of octave i: a step of 2^32 / golden ratio an octave.
+pub fn octave_seed(seed: u32, i: i32) -> u32 {
+    seed.wrapping_add(i.cast_unsigned().wrapping_mul(0x9e37_79b9))
+}
+
+/// The shift of octave i: odd 64ths after the multiples of `steps / 2^32`; none for octave 0.
+fn octave_shift<const N: usize>(i: i32, seed: u32, steps: [u32; N]) -> [f64; N] {
+    let start = seed.wrapping_mul(2_654_435_761);
+    steps.map(|step| {
+        let word = start.wrapping_add(step.wrapping_mul(i.cast_unsigned()));
+        if i == 0 {
+            0.0
+        } else {
+            f64::from(2 * (word >> 27) + 1) / 64.0
+        }
+    })
+}
+
+/// The shift of octave i's lattice in 2D.
+pub fn octave_shift_2d(i: i32, seed: u32) -> [f64; 2] {
+    octave_shift(i, seed, [3_242_174_889, 2_447_445_413])
+}
+
+/// The shift of octave i's lattice in 3D.
+pub fn octave_shift_3d(i: i32, seed: u32) -> [f64; 3] {
+    octave_shift(i, seed, [3_518_319_155, 2_882_110_345, 2_360_945_575])
+}
+
+/// A position on the lattice of octave i: 2^i times as fine, shifted.
+pub fn octave_2d(cell: [i32; 2], frac: [f64; 2], i: i32, seed: u32) -> Lattice2d {
+    let (cell, frac) = place(cell, frac, i, octave_shift_2d(i, seed));
+    Lattice2d { cell, frac }
+}
+
+/// A position on the lattice of octave i in 3D.
+pub fn octave_3d(cell: [i32; 3], frac: [f64; 3], i: i32, seed: u32) -> Lattice3d {
+    let (cell, frac) = place(cell, frac, i, octave_shift_3d(i, seed));
+    Lattice3d { cell, frac }
+}
+
+/// The cell modulo the period, never negative. A period below 1 counts as 1.
+pub fn wrap_3d(cell: [i32; 3], period: [i32; 3]) -> [i32; 3] {
+    std::array::from_fn(|axis| cell[axis].rem_euclid(period[axis].max(1)))
+}
+
+/// The quintic fade 6 t^5 - 15 t^4 + 10 t^3.
+pub fn fade(t: f64) -> f64 {
+    t * t * t * (t * (6.0 * t - 15.0) + 10.0)
+}
+
+/// Its derivative, 30 t^2 (1 - t)^2.
+pub fn fade_slope(t: f64) -> f64 {
+    let q = t * (1.0 - t);
+    30.0 * q * q
+}
+
+/// Sums `corner(offset)`, a value and its gradient with respect to the position, over all corners of a cell with the
+/// product of the fades as weight. The answer is the value, then the gradient.
+fn blend<const N: usize>(
+    frac: [f64; N],
+    corner: impl Fn([i32; N]) -> (f64, [f64; N]),
+) -> (f64, [f64; N]) {
+    let rise = frac.map(fade);
+    let slope = frac.map(fade_slope);
+    let mut sum = 0.0;
+    let mut gradient = [0.0; N];
+    for index in 0..1_usize << N {
+        let offset: [i32; N] = std::array::from_fn(|axis| i32::from(index >> axis & 1 == 1));
+        let weight = |axis: usize| {
+            if offset[axis] == 1 {
+                rise[axis]
+            } else {
+                1.0 - rise[axis]
+            }
+        };
+        let (value, change) = corner(offset);
+        let whole: f64 = (0..N).map(weight).product();
+        sum += whole * value;
+        for axis in 0..N {
+            let others: f64 = (0..N).filter(|&k| k != axis).map(weight).product();
+            let sign = f64::from(2 * offset[axis] - 1);
+            gradient[axis] += whole * change[axis] + others * sign * slope[axis] * value;
+        }
+    }
+    (sum, gradient)
+}
+
+fn neighbour<const N: usize>(cell: [i32; N], offset: [i32; N]) -> [i32; N] {
+    std::array::from_fn(|axis| cell[axis].wrapping_add(offset[axis]))
+}
+
+/// Value noise in 2D and its gradient: value, d/dx, d/dy.
+pub fn value_noise_2d_slope(cell: [i32; 2], frac: [f64; 2], seed: u32) -> [f64; 3] {
+    let p = split_2d(cell, frac);
+    let (value, [dx, dy]) = blend(p.frac, |offset| {
+        let word = lattice_hash_2d(neighbour(p.cell, offset), seed)[0];
+        (unit_float(word), [0.0; 2])
+    });
+    [value, dx, dy]
+}
+
+/// Value noise in 3D and its gradient: value, d/dx, d/dy, d/dz.
+pub fn value_noise_3d_slope(cell: [i32; 3], frac: [f64; 3], seed: u32) -> [f64; 4] {
+    let p = split_3d(cell, frac);
+    let (value, [dx, dy, dz]) = blend(p.frac, |offset| {
+        let word = lattice_hash_3d(neighbour(p.cell, offset), seed)[0];
+        (unit_float(word), [0.0; 3])
+    });
+    [value, dx, dy, dz]
+}
+
+/// Value noise in 2D.
+pub fn value_noise_2d(cell: [i32; 2], frac: [f64; 2], seed: u32) -> f64 {
+    value_noise_2d_slope(cell, frac, seed)[0]
+}
+
+/// Value noise in 3D.
+pub fn value_noise_3d(cell: [i32; 3], frac: [f64; 3], seed: u32) -> f64 {
+    value_noise_3d_slope(cell, frac, seed)[0]
+}
+
+/// Value noise in 3D whose lattice repeats after `period` cells.
+pub fn value_noise_3d_periodic(
+    cell: [i32; 3],
+    frac: [f64; 3],
+    period: [i32; 3],
+    seed: u32,
+) -> f64 {
+    let p = split_3d(cell, frac);
+    let (value, _) = blend(p.frac, |offset| {
+        let word = lattice_hash_3d(wrap_3d(neighbour(p.cell, offset), period), seed)[0];
+        (unit_float(word), [0.0; 3])
+    });
+    value
+}
+
+/// The gradient at a lattice point in 2D: length sqrt(2), an angle of 23 bits in the first quadrant, two signs.
+pub fn lattice_gradient_2d(cell: [i32; 2], seed: u32) -> [f64; 2] {
+    let word = lattice_hash_2d(cell, seed)[0];
+    let angle = std::f64::consts::FRAC_PI_2 * f64::from(word >> 9) / f64::from(1_u32 << 23);
+    let (sine, cosine) = angle.sin_cos();
+    let sign = |bit: u32| if word >> bit & 1 == 1 { -1.0 } else { 1.0 };
+    let length = std::f64::consts::SQRT_2;
+    [length * sign(0) * cosine, length * sign(1) * sine]
+}
+
+/// The gradient at a lattice point in 3D: length 2/sqrt(3), one of the 24 vectors (0, +-a, +-b) and permutations with
+/// a/b the golden ratio or its inverse.
+pub fn lattice_gradient_3d(cell: [i32; 3], seed: u32) -> [f64; 3] {
+    let word = lattice_hash_3d(cell, seed)[0];
+    let golden = (1.0 + 5_f64.sqrt()) / 2.0;
+    let length = 2.0 / 3_f64.sqrt();
+    let long = length * golden / (1.0 + golden * golden).sqrt();
+    let short = length / (1.0 + golden * golden).sqrt();
+    let sign = |bit: u32| if word >> bit & 1 == 1 { -1.0 } else { 1.0 };
+    let sides = if word >> 2 & 1 == 1 {
+        [short, long]
+    } else {
+        [long, short]
+    };
+    let p = sign(0) * sides[0];
+    let q = sign(1) * sides[1];
+    // The word as a signed number, in thirds of its range, says which component is 0; the others follow cyclically.
+    let third = (i64::from(word.cast_signed()) + (1 << 31)) * 3 >> 32;
+    match third {
+        0 => [0.0, p, q],
+        1 => [q, 0.0, p],
+        _ => [p, q, 0.0],
+    }
+}
+
+/// Gradient noise in 2D and its gradient: value, d/dx, d/dy.
+pub fn gradient_noise_2d_slope(cell: [i32; 2], frac: [f64; 2], seed: u32) -> [f64; 3] {
+    let p = split_2d(cell, frac);
+    let (value, [dx, dy]) = blend(p.frac, |offset| {
+        let g = lattice_gradient_2d(neighbour(p.cell, offset), seed);
+        let product = (0..2)
+            .map(|axis| g[axis] * (p.frac[axis] - f64::from(offset[axis])))
+            .sum();
+        (product, g)
+    });
+    [value, dx, dy]
+}
+
+/// Gradient noise in 3D and its gradient: value, d/dx, d/dy, d/dz.
+pub fn gradient_noise_3d_slope(cell: [i32; 3], frac: [f64; 3], seed: u32) -> [f64; 4] {
+    let p = split_3d(cell, frac);
+    let (value, [dx, dy, dz]) = blend(p.frac, |offset| {
+        let g = lattice_gradient_3d(neighbour(p.cell, offset), seed);
+        let product = (0..3)
+            .map(|axis| g[axis] * (p.frac[axis] - f64::from(offset[axis])))
+            .sum();
+        (product, g)
+    });
+    [value, dx, dy, dz]
+}
+
+/// Gradient noise in 2D.
+pub fn gradient_noise_2d(cell: [i32; 2], frac: [f64; 2], seed: u32) -> f64 {
+    gradient_noise_2d_slope(cell, frac, seed)[0]
+}
+
+/// Gradient noise in 3D.
+pub fn gradient_noise_3d(cell: [i32; 3], frac: [f64; 3], seed: u32) -> f64 {
+    gradient_noise_3d_slope(cell, frac, seed)[0]
+}

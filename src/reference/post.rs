@@ -1,0 +1,35 @@
+//! Output encoding.
+
+/// sRGB signal of a linear light (IEC 61966-2-1), per channel.
+pub fn encode_srgb(linear: [f64; 3]) -> [f64; 3] {
+    linear.map(|c| {
+        let c = c.max(0.0);
+        if c <= 0.0031308 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 }
+    })
+}
+
+/// Linear light of an sRGB signal (IEC 61966-2-1), per channel.
+pub fn decode_srgb(encoded: [f64; 3]) -> [f64; 3] {
+    encoded.map(|c| {
+        let c = c.max(0.0);
+        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+    })
+}
+
+/// Threshold of a pixel in Bayer's 8 x 8 matrix, built by his recursion M(2n) = [4M, 4M + 2; 4M + 3, 4M + 1].
+pub fn bayer_8x8(pixel: [u32; 2]) -> f64 {
+    fn rank(x: u32, y: u32, size: u32) -> u32 {
+        if size == 1 {
+            return 0;
+        }
+        let half = size / 2;
+        let quadrant = [[0, 2], [3, 1]][(y / half % 2) as usize][(x / half % 2) as usize];
+        4 * rank(x % half, y % half, half) + quadrant
+    }
+    (f64::from(rank(pixel[0] % 8, pixel[1] % 8, 8)) + 0.5) / 64.0
+}
+
+/// A signal shifted by less than half an output step.
+pub fn dither(encoded: [f64; 3], pixel: [u32; 2], levels: f64) -> [f64; 3] {
+    encoded.map(|c| c + (bayer_8x8(pixel) - 0.5) / levels)
+}

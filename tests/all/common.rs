@@ -1,0 +1,166 @@
+//! What the tests share: the device, the modules of this repository, rows and comparisons.
+
+use veduta::device::{Gpu, shared};
+use veduta::eval::{Evaluator, Spec};
+use veduta_compose::library::Library;
+
+/// The shared device; its absence fails the test with the line that installs a driver.
+pub fn gpu() -> &'static Gpu {
+    match shared() {
+        Ok(gpu) => gpu,
+        Err(e) => panic!("{e}"),
+    }
+}
+
+/// The modules in this repository's `wgsl` folder, as they are now.
+pub fn modules() -> Library {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("wgsl");
+    match Library::load(&[folder]) {
+        Ok(library) => library,
+        Err(e) => panic!("{e}"),
+    }
+}
+
+/// An evaluator of `expression` over rows of `columns` numbers, with our modules to import from.
+pub fn evaluator(imports: &[&str], prelude: &str, expression: &str, columns: usize) -> Evaluator {
+    let spec = Spec {
+        imports,
+        prelude,
+        expression,
+        columns,
+    };
+    match Evaluator::new(gpu(), &modules(), &spec) {
+        Ok(e) => e,
+        Err(e) => panic!("{e}"),
+    }
+}
+
+/// A small generator of random bits (splitmix64), so that every run sees the same numbers.
+pub struct Random(pub u64);
+
+impl Random {
+    /// The next 64 bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// The next number in [0, 1), a multiple of 2^-24 and so exact in `f32`.
+    pub fn unit(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 / (1_u32 << 24) as f32
+    }
+
+    /// The next number in [low, high).
+    pub fn between(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.unit()
+    }
+}
+
+/// A picture in `f32`, four channels a pixel, row after row from the top.
+pub struct Picture {
+    /// Pixels a row.
+    pub width: u32,
+    /// Red, green, blue, alpha of each pixel.
+    pub pixels: Vec<[f32; 4]>,
+}
+
+/// Draws one frame into a texture of `format` (`Rgba32Float` or `Rgba8Unorm`) and reads it back.
+pub fn draw(
+    landscape: &mut veduta::Landscape,
+    view: &veduta::View,
+    size: [u32; 2],
+    format: wgpu::TextureFormat,
+) -> Picture {
+    let gpu = gpu();
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("picture"),
+        size: wgpu::Extent3d {
+            width: size[0],
+            height: size[1],
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    });
+    let target = texture.create_view(&Default::default());
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let _ = landscape
+        .prepare(&gpu.device, &gpu.queue, &mut encoder, view)
+        .unwrap();
+    {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations::default(),
+            })],
+            ..Default::default()
+        });
+        let _ = landscape.composite(&mut pass);
+    }
+    gpu.queue.submit([encoder.finish()]);
+    let data = gpu.read_texture(&texture).unwrap();
+    let texel = format.block_copy_size(None).unwrap() as usize;
+    let pixels = data
+        .chunks_exact(texel)
+        .map(|pixel| match texel {
+            4 => [0, 1, 2, 3].map(|i| f32::from(pixel[i]) / 255.0),
+            _ => [0, 4, 8, 12].map(|i| {
+                f32::from_le_bytes([pixel[i], pixel[i + 1], pixel[i + 2], pixel[i + 3]])
+            }),
+        })
+        .collect();
+    Picture {
+        width: size[0],
+        pixels,
+    }
+}
+
+impl Picture {
+    /// Every component that is not finite.
+    pub fn not_finite(&self) -> usize {
+        self.pixels
+            .iter()
+            .flatten()
+            .filter(|v| !v.is_finite())
+            .count()
+    }
+
+    /// The mean of the first three channels over the pixels that `keep` wants.
+    pub fn mean(&self, keep: impl Fn(usize, usize) -> bool) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        let mut count = 0.0;
+        for (i, pixel) in self.pixels.iter().enumerate() {
+            if keep(i % self.width as usize, i / self.width as usize) {
+                count += 1.0;
+                for c in 0..3 {
+                    sum[c] += f64::from(pixel[c]);
+                }
+            }
+        }
+        sum.map(|s| s / count)
+    }
+}
+
+/// CPU seconds of this process so far, user and system, over all its threads.
+///
+/// The device's own threads belong to the process on a software driver, so that this is what a frame costs there.
+pub fn cpu_seconds() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
+    let fields: Vec<&str> = stat
+        .rsplit_once(')')
+        .unwrap()
+        .1
+        .split_whitespace()
+        .collect();
+    // Clock ticks are hundredths of a second on every Linux that runs this.
+    (fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap()) / 100.0
+}

@@ -1,0 +1,503 @@
+//! The whole picture: what it reads, that it is finite everywhere, what its keys change, and what it costs.
+
+use crate::common::{Picture, cpu_seconds, draw, evaluator, gpu};
+use veduta::glam::{DVec3, I64Vec3, Vec3};
+use veduta::program::{KeyKind, StageKind};
+use veduta::view::direction;
+use veduta::{Error, Landscape, LandscapeOptions, Light, Preset, Targets, Value, View, WorldPos, programs};
+
+const HDR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+const SMALL: [u32; 2] = [64, 36];
+
+fn targets(color_format: wgpu::TextureFormat) -> Targets {
+    Targets {
+        color_format,
+        ..Default::default()
+    }
+}
+
+fn landscape(preset: &str, scene: &str, values: &[(&str, Value)]) -> Landscape {
+    let options = LandscapeOptions {
+        preset: Preset::Named(preset.to_owned().into()),
+        scene: scene.to_owned(),
+        values: values.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect(),
+    };
+    Landscape::new(&gpu().device, programs(), &targets(HDR), &options).unwrap()
+}
+
+/// A frozen view as the command line places it, `time` seconds into the flight.
+pub fn frozen(name: &str, time: f64) -> View {
+    let text = std::fs::read_to_string(
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("presets/views/{name}.ron")),
+    )
+    .unwrap();
+    let number = |field: &str| -> Option<f64> {
+        let rest = text.split(&format!("{field}:")).nth(1)?;
+        rest.split([',', ')']).next()?.trim().parse().ok()
+    };
+    let place = text
+        .split("place: (")
+        .nth(1)
+        .map(|rest| {
+            let mut numbers = rest.split([',', ')']).map(|n| n.trim().parse::<f64>().unwrap());
+            [numbers.next().unwrap(), numbers.next().unwrap()]
+        })
+        .unwrap_or([0.0; 2]);
+    let yaw = number("yaw_deg").unwrap_or(0.0).to_radians();
+    let speed = 50.0;
+    let foot = DVec3::new(place[0], 0.0, place[1]) + direction(0.0, yaw) * (speed * time);
+    let mut view = View {
+        eye: WorldPos::from_metres(foot),
+        exposure: 1.0,
+        time,
+        sun: Light {
+            to_light: direction(
+                number("sun_height_deg").unwrap().to_radians(),
+                yaw + number("sun_azimuth_deg").unwrap().to_radians(),
+            )
+            .as_vec3(),
+            irradiance: Vec3::splat(20.0),
+            ..Default::default()
+        },
+        ..Default::default()
+    };
+    let ground = ground_height(view.eye);
+    view.eye = view
+        .eye
+        .moved_by(DVec3::new(0.0, ground + number("eye_height").unwrap(), 0.0));
+    view.look(
+        yaw,
+        number("pitch_deg").unwrap().to_radians(),
+        (number("fov_deg").unwrap() as f32).to_radians(),
+        16.0 / 9.0,
+    );
+    view
+}
+
+/// Height of the thesis terrain under a position, in double precision.
+fn ground_height(place: WorldPos) -> f64 {
+    let settings = veduta::Settings::resolve(programs(), &Preset::Thesis, None, &[]).unwrap();
+    let number = |name: &str| settings.number(name).unwrap();
+    let x = place.lattice(0, number("TERRAIN_SCALE")).unwrap();
+    let z = place.lattice(2, number("TERRAIN_SCALE")).unwrap();
+    number("TERRAIN_HEIGHT")
+        * veduta::reference::fractal::ridged_multifractal_2d(
+            [x.cell, z.cell],
+            [f64::from(x.frac), f64::from(z.frac)],
+            number("OCTAVES") as i32,
+            number("TERRAIN_HURST"),
+            number("TERRAIN_GAIN"),
+            0.0,
+            number("TERRAIN_SEED") as u32,
+        )
+}
+
+fn difference(a: &Picture, b: &Picture) -> f64 {
+    a.pixels
+        .iter()
+        .zip(&b.pixels)
+        .flat_map(|(p, q)| p.iter().zip(q).map(|(x, y)| f64::from((x - y).abs())))
+        .sum::<f64>()
+        / a.pixels.len() as f64
+}
+
+#[test]
+fn row_l01_one_fragment_pass_without_textures() {
+    for program in programs().programs.iter().filter(|p| p.program == "landscape") {
+        assert_eq!(program.stages.len(), 2, "a covering triangle and the picture");
+        for binding in program.bindings.iter() {
+            assert!(
+                matches!(
+                    binding.ty,
+                    wgpu::BindingType::Buffer {
+                        ty: wgpu::BufferBindingType::Uniform,
+                        ..
+                    }
+                ),
+                "{} is more than parameters",
+                binding.name
+            );
+        }
+        let vertex = program.stage(StageKind::Vertex).unwrap();
+        assert!(!vertex.wgsl.contains("@location(1)"), "no vertex data");
+    }
+    let mut work = landscape("thesis_low", "thesis", &[]);
+    assert!(draw(&mut work, &frozen("V01", 0.0), SMALL, HDR).mean(|_, _| true)[2] > 0.01);
+}
+
+#[test]
+fn every_frozen_view_is_finite_in_both_presets() {
+    for preset in ["thesis", "thesis_low"] {
+        let mut land = landscape(preset, "thesis", &[("CLOUD_STEPS", Value::Int(16))]);
+        for n in 1..=12 {
+            let name = format!("V{n:02}");
+            let picture = draw(&mut land, &frozen(&name, 0.0), SMALL, HDR);
+            assert_eq!(picture.not_finite(), 0, "{preset} {name}");
+            let mean = picture.mean(|_, _| true);
+            assert!(mean.iter().all(|m| *m >= 0.0), "{preset} {name} {mean:?}");
+            assert!(mean[2] > 1e-7, "{preset} {name} is black: {mean:?}");
+        }
+    }
+}
+
+#[test]
+fn the_first_view_is_about_two_thirds_sky() {
+    let mut land = landscape("thesis_low", "clear", &[("MIE_G", Value::Float(0.0))]);
+    let mut black = frozen("V01", 0.0);
+    // Without air the sky is black and the ground is not.
+    black.sun.to_light = direction(0.5, 2.0).as_vec3();
+    land.set_content("RAYLEIGH_SCATTERING", Value::Vec3([0.0; 3])).unwrap();
+    land.set_content("MIE_SCATTERING", Value::Float(0.0)).unwrap();
+    land.set_content("MIE_EXTINCTION", Value::Float(0.0)).unwrap();
+    let picture = draw(&mut land, &black, [128, 72], HDR);
+    let sky = picture.pixels.iter().filter(|p| p[2] == 0.0).count() as f64 / picture.pixels.len() as f64;
+    println!("sky share of V01: {sky:.3}");
+    assert!((0.5..0.75).contains(&sky), "{sky}");
+}
+
+#[test]
+fn row_l15_octaves_act_apart() {
+    let view = frozen("V03", 0.0);
+    let mut base = landscape("thesis", "clear", &[]);
+    let whole = draw(&mut base, &view, SMALL, HDR);
+    for (key, value) in [("OCTAVES", 5), ("OCTAVES_SHADOW", 2), ("OCTAVES_NORMAL", 5)] {
+        let mut other = landscape("thesis", "clear", &[(key, Value::Int(value))]);
+        let picture = draw(&mut other, &view, SMALL, HDR);
+        let change = difference(&whole, &picture);
+        println!("{key} = {value} changes the picture by {change:.5}");
+        assert!(change > 1e-6, "{key} changes nothing");
+        if key != "OCTAVES" {
+            // The sky, where no ground is met, stays the same to the bit.
+            let same = whole.pixels.iter().zip(&picture.pixels).filter(|(a, b)| a == b).count();
+            assert!(same > 0, "{key} changes the sky as well");
+        }
+    }
+}
+
+#[test]
+fn row_l34_jitter_trades_stripes_for_noise() {
+    let view = frozen("V08", 0.0);
+    let size = [128, 72];
+    let picture = |jitter: bool| {
+        let mut land = landscape(
+            "thesis",
+            "sky",
+            &[
+                ("CLOUD_STEPS", Value::Int(8)),
+                ("CLOUD_LIGHT_STEPS", Value::Int(4)),
+                ("CLOUD_JITTER", Value::Flag(jitter)),
+            ],
+        );
+        draw(&mut land, &view, size, HDR)
+    };
+    let (striped, noisy) = (picture(false), picture(true));
+    // Noise: the difference between neighbours that a smooth picture does not have.
+    let roughness = |p: &Picture| {
+        let w = p.width as usize;
+        (0..p.pixels.len())
+            .filter(|i| i % w >= 1 && i % w + 1 < w)
+            .map(|i| {
+                f64::from(p.pixels[i - 1][1] - 2.0 * p.pixels[i][1] + p.pixels[i + 1][1]).abs()
+            })
+            .sum::<f64>()
+            / p.pixels.len() as f64
+    };
+    let (a, b) = (roughness(&striped), roughness(&noisy));
+    println!("second difference without jitter {a:.5}, with {b:.5}");
+    assert!(b > 1.2 * a, "jitter adds no noise");
+    let (ma, mb) = (striped.mean(|_, _| true), noisy.mean(|_, _| true));
+    for c in 0..3 {
+        assert!((ma[c] - mb[c]).abs() < 0.05 * ma[c], "mean changed: {ma:?} {mb:?}");
+    }
+}
+
+#[test]
+fn row_l37_the_flight_follows_the_ground_and_moves_the_world() {
+    for time in [0.0, 1.0, 60.0, 1e6] {
+        let view = frozen("V01", time);
+        let ground = ground_height(view.eye);
+        assert!((view.eye.altitude() - ground - 300.0).abs() < 1e-3, "{time}");
+        assert!((view.eye.to_metres().z + 50.0 * time).abs() < 1e-6 * (1.0 + time));
+    }
+    let mut land = landscape("thesis", "thesis", &[("CLOUD_STEPS", Value::Int(8))]);
+    let size = [48, 27];
+    let start = draw(&mut land, &frozen("V01", 0.0), size, HDR);
+    let later = draw(&mut land, &frozen("V01", 60.0), size, HDR);
+    let far = draw(&mut land, &frozen("V01", 1e6), size, HDR);
+    assert!(difference(&start, &later) > 1e-3 && difference(&start, &far) > 1e-3);
+    assert_eq!(far.not_finite(), 0);
+    // The clouds move too: straight up, with no ground in the picture.
+    let mut up = landscape("thesis", "sky", &[("CLOUD_STEPS", Value::Int(8))]);
+    let mut view = frozen("V08", 0.0);
+    let before = draw(&mut up, &view, size, HDR);
+    view.eye = view.eye.moved_by(DVec3::new(0.0, 0.0, -50.0 * 60.0));
+    assert!(difference(&before, &draw(&mut up, &view, size, HDR)) > 1e-4);
+}
+
+/// The world repeats after a whole period of every lattice, so that a picture there must be the same picture: what is
+/// lost far out would show.
+#[test]
+fn far_from_the_origin_nothing_is_lost() {
+    let mut land = landscape("thesis", "thesis", &[("CLOUD_STEPS", Value::Int(8))]);
+    let view = frozen("V03", 0.0);
+    let near = draw(&mut land, &view, SMALL, HDR);
+    let mut away = view;
+    // 2^32 cells of 8192 m; also whole periods of the rock (32 m) and of the clouds (4 x 4000 m)?
+    // 2^32 * 8192 m = 2^45 m is 2^40 rock cells, which is 0 modulo 2^32, and 2^45 / 16000 is not whole: no clouds here.
+    let mut clear = landscape("thesis", "clear", &[]);
+    let here = draw(&mut clear, &view, SMALL, HDR);
+    away.eye.cell += I64Vec3::new(1 << 45, 0, 1 << 45);
+    let there = draw(&mut clear, &away, SMALL, HDR);
+    assert_eq!(here.pixels, there.pixels);
+    assert!(difference(&near, &here) >= 0.0);
+}
+
+#[test]
+fn row_l38_every_parameter_exists_and_acts() {
+    // Section 10 of the source, and the parameters that it mentions without a name.
+    let named = [
+        "LOW_QUALITY", "MAX_RENDERING_DISTANCE", "MAX_MARCHING_STEPS", "MAX_MARCHING_STEPS_SHADOW", "TEXTURE_LOW_QUALITY",
+        "TEXTURE_FILTERING", "FILTERING_SAMPLES", "ATMOS_STEPS", "ATMOS_LIGHT_STEPS", "CLOUD_STEPS", "CLOUD_LIGHT_STEPS",
+        "CLOUD_COVERAGE", "OCTAVES", "OCTAVES_SHADOW", "OCTAVES_NORMAL", "SMOOTH_RIDGES", "CLOUDS_HEIGHT",
+        "CLOUDS_THICKNESS", "CAM_HEIGHT", "CAM_SPEED", "SUN_HEIGHT", "SUN_AZIMUTH", "TERRAIN_HEIGHT", "TERRAIN_SCALE",
+        "CLOUD_SCATTERING", "CLOUD_ABSORPTION", "CLOUD_DENSITY", "CLOUD_G_FORWARD", "CLOUD_G_BACKWARD",
+        "CLOUD_BACKWARD_SHARE",
+    ];
+    let thesis = programs().preset("thesis").unwrap();
+    for name in named {
+        let key = programs().key(name).unwrap();
+        assert!(key.meaning.len() > 10, "{name} has no meaning");
+        assert!(thesis.values.iter().any(|(n, _)| n == name), "thesis.ron lacks {name}");
+        key.check(key.default).unwrap();
+    }
+    // Content keys of the picture change it and never make a pipeline; what they do not name stays.
+    let view = frozen("V01", 0.0);
+    let mut land = landscape("thesis", "thesis", &[("CLOUD_STEPS", Value::Int(8)), ("SMOOTH_RIDGES", Value::Flag(true))]);
+    let base = draw(&mut land, &view, SMALL, HDR);
+    let layout = programs()
+        .get("landscape", &["TERRAIN", "ATMOSPHERE", "CLOUDS"])
+        .unwrap()
+        .layout("Content")
+        .unwrap();
+    for member in layout.members.iter() {
+        let name = member.name.to_uppercase();
+        let key = programs().key(&name).unwrap();
+        assert_eq!(key.kind, KeyKind::Content, "{name}");
+        let old = land.settings().get(&name).unwrap();
+        let new = match old {
+            Value::Float(v) if v == 0.0 => Value::Float(0.01),
+            Value::Float(v) => Value::Float(v * 0.7),
+            Value::Int(v) => Value::Int(v + 1),
+            Value::Vec3(v) => Value::Vec3(v.map(|x| x * 0.5)),
+            flag => flag,
+        };
+        land.set_content(&name, new).unwrap();
+        let changed = draw(&mut land, &view, SMALL, HDR);
+        assert_eq!(changed.not_finite(), 0, "{name}");
+        assert!(difference(&base, &changed) > 1e-7, "{name} changes nothing");
+        land.set_content(&name, old).unwrap();
+    }
+    assert_eq!(draw(&mut land, &view, SMALL, HDR).pixels, base.pixels);
+}
+
+#[test]
+fn row_l39_low_quality_leaves_clouds_out_and_is_twice_as_fast() {
+    let low = programs()
+        .get("landscape", &["TERRAIN", "ATMOSPHERE", "LOW_QUALITY", "TEXTURE_LOW_QUALITY"])
+        .or_else(|_| programs().get("landscape", &["TERRAIN", "ATMOSPHERE", "CLOUDS", "LOW_QUALITY", "TEXTURE_LOW_QUALITY"]))
+        .unwrap();
+    assert!(!low.stage(StageKind::Fragment).unwrap().wgsl.contains("march_clouds"));
+    let view = frozen("V01", 0.0);
+    let size = [128, 72];
+    let mut normal = landscape("thesis", "thesis", &[]);
+    let mut cheap = landscape("thesis_low", "thesis", &[]);
+    let (a, b) = paired(5, || drop(draw(&mut normal, &view, size, HDR)), || drop(draw(&mut cheap, &view, size, HDR)));
+    println!("normal {:.1} ms, low {:.1} ms of CPU at 128x72: {:.2} times", a * 1e3, b * 1e3, a / b);
+    assert!(a / b > 1.9, "{}", a / b);
+}
+
+/// Medians of the CPU seconds of two works, run in turns after one warm-up each.
+fn paired(rounds: usize, mut a: impl FnMut(), mut b: impl FnMut()) -> (f64, f64) {
+    a();
+    b();
+    let mut times = [Vec::new(), Vec::new()];
+    for _ in 0..rounds {
+        for (i, work) in [&mut a as &mut dyn FnMut(), &mut b].into_iter().enumerate() {
+            let start = cpu_seconds();
+            for _ in 0..3 {
+                work();
+            }
+            times[i].push((cpu_seconds() - start) / 3.0);
+        }
+    }
+    let median = |t: &mut Vec<f64>| {
+        t.sort_by(f64::total_cmp);
+        t[t.len() / 2]
+    };
+    let [ta, tb] = &mut times;
+    (median(ta), median(tb))
+}
+
+/// The source's algorithm 5 shades inside the march, algorithm 6 after it. Both give the same picture; the times are
+/// printed, since on a software device the layout may matter less than on the source's card.
+#[test]
+fn row_l40_marching_only_finds_the_hit() {
+    let prelude = "
+fn land() -> Terrain { return Terrain(vec2<i32>(3, 5), vec2<f32>(0.3, 0.6), 8192.0, 1400.0, 1.0, 2.0, 0.0, 1u); }
+fn lit(dir: vec3<f32>, t: f32) -> f32 {
+    let point = dir * t;
+    let normal = terrain_normal(land(), 6.36e6, 2500.0, point, max(0.002 * t, 0.05), 8);
+    let sun = vec3<f32>(0.6, 0.64, 0.48);
+    let shadow = soft_shadow(land(), 6.36e6, 2500.0, point, normal, sun, 2.0, 3e4, 24.0, 0.5, 1.0, 40, 6);
+    return 0.1 + max(dot(normal, sun), 0.0) * shadow.light;
+}
+fn sequential(dir: vec3<f32>) -> f32 {
+    let hit = march(land(), 6.36e6, 2500.0, dir, 1.0, 3e4, 0.5, 1.0, 200, 8);
+    if hit.distance < 0.0 { return 0.0; }
+    return lit(dir, hit.distance);
+}
+fn nested(dir: vec3<f32>) -> f32 {
+    var t = 1.0;
+    var light = 0.0;
+    for (var i = 0; i < 200; i++) {
+        let clearance = ray_clearance(land(), 6.36e6, 2500.0, dir, t, 8);
+        if clearance < 0.001 * t {
+            light = lit(dir, t);
+            break;
+        }
+        t += 0.5 * clearance;
+        if t > 3e4 { break; }
+    }
+    return light;
+}
+";
+    let imports = [
+        "veduta::terrain::height::Terrain",
+        "veduta::terrain::march::{march, ray_clearance}",
+        "veduta::terrain::normal::terrain_normal",
+        "veduta::terrain::shadow::soft_shadow",
+    ];
+    let make = |name: &str| evaluator(&imports, prelude, &format!("{name}(normalize(vec3f(in.f[0], in.f[1], -1.0)))"), 2);
+    let (a, b) = (make("sequential"), make("nested"));
+    let mut rows = Vec::new();
+    for y in 0..72 {
+        for x in 0..128 {
+            rows.push(((x as f32 - 63.5) / 64.0).to_bits());
+            rows.push(((30.0 - y as f32) / 64.0).to_bits());
+        }
+    }
+    let (va, vb) = (a.run(&rows).unwrap(), b.run(&rows).unwrap());
+    let worst = va.iter().zip(&vb).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+    assert!(worst < 1e-3, "the layouts disagree by {worst}");
+    assert!(va.iter().filter(|v| **v > 0.0).count() > va.len() / 4);
+    let (ta, tb) = paired(3, || drop(a.run(&rows)), || drop(b.run(&rows)));
+    println!("march, then shade {:.1} ms; shade inside the march {:.1} ms of CPU: {:.2} times", ta * 1e3, tb * 1e3, tb / ta);
+    assert!(ta < 1.5 * tb, "the sequential layout costs {ta}, the nested one {tb}");
+}
+
+#[test]
+fn a_still_frame_uploads_nothing_and_content_makes_no_pipeline() {
+    let gpu = gpu();
+    let mut land = landscape("thesis_low", "thesis", &[]);
+    let view = frozen("V01", 0.0);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let mut prepare = |land: &mut Landscape, view: &View| {
+        land.prepare(&gpu.device, &gpu.queue, &mut encoder, view).unwrap()
+    };
+    let first = prepare(&mut land, &view);
+    assert!(first.bytes > 0 && first.bakes == 0 && first.dispatches == 0 && first.draws == 0);
+    assert_eq!(prepare(&mut land, &view).bytes, 0);
+    let before = land.pipeline().clone();
+    land.set_content("CLOUD_COVERAGE", Value::Float(0.9)).unwrap();
+    land.set_content("TERRAIN_HEIGHT", Value::Float(500.0)).unwrap();
+    let work = prepare(&mut land, &view);
+    assert!(work.bytes > 0 && work.bytes < 1024);
+    assert_eq!(&before, land.pipeline(), "content made a new pipeline");
+    let refused = land.set_content("CLOUD_STEPS", Value::Int(3)).unwrap_err();
+    assert!(refused.to_string().contains("a quality key"), "{refused}");
+}
+
+#[test]
+fn bad_input_gets_a_typed_error() {
+    let device = &gpu().device;
+    let new = |targets: Targets, options: LandscapeOptions| {
+        Landscape::new(device, programs(), &targets, &options).unwrap_err()
+    };
+    let with = |name: &str, value: Value| LandscapeOptions {
+        values: vec![(name.to_owned(), value)],
+        ..Default::default()
+    };
+    let fault = |e: Error, parts: &[&str]| {
+        let text = e.to_string();
+        for part in parts {
+            assert!(text.contains(part), "`{text}` lacks `{part}`");
+        }
+    };
+    let ok = targets(HDR);
+    fault(new(targets(wgpu::TextureFormat::Depth32Float), Default::default()), &["targets.color_format", "Depth32Float"]);
+    fault(new(targets(wgpu::TextureFormat::R8Unorm), Default::default()), &["three channels"]);
+    fault(new(Targets { sample_count: 3, ..ok }, Default::default()), &["sample_count", "3", "1, 2, 4"]);
+    fault(new(Targets { projection: veduta::landscape::Projection::Orthographic, ..ok }, Default::default()), &["Perspective"]);
+    fault(new(ok, with("CLOUD_STEPS", Value::Int(0))), &["CLOUD_STEPS", "0", "[1, 4096]"]);
+    fault(new(ok, with("CLOUD_COVERAGE", Value::Float(f64::NAN))), &["CLOUD_COVERAGE", "NaN", "[0, 1]"]);
+    fault(new(ok, with("CLOUD_COVERAGE", Value::Flag(true))), &["CLOUD_COVERAGE", "true", "f32"]);
+    fault(new(ok, with("CLOUD_COVERAGES", Value::Int(1))), &["CLOUD_COVERAGES", "did you mean `CLOUD_COVERAGE`"]);
+    fault(new(ok, LandscapeOptions { scene: "moon".into(), ..Default::default() }), &["moon", "`thesis`"]);
+    fault(new(ok, LandscapeOptions { preset: Preset::Named("ultra".into()), ..Default::default() }), &["ultra", "`high`"]);
+    let not_built = programs().get("landscape", &["TERRAIN", "COUNT_OPERATIONS"]).unwrap_err();
+    assert!(matches!(not_built, Error::VariantNotBuilt { .. }), "{not_built}");
+    fault(not_built, &["COUNT_OPERATIONS", "nearest"]);
+    assert!(matches!(programs().get("ocean", &[]).unwrap_err(), Error::UnknownProgram { .. }));
+    let mut land = landscape("thesis_low", "thesis", &[]);
+    let gpu = gpu();
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let mut refuse = |change: &dyn Fn(&mut View), part: &str| {
+        let mut view = View::default();
+        change(&mut view);
+        let text = land.prepare(&gpu.device, &gpu.queue, &mut encoder, &view).unwrap_err().to_string();
+        assert!(text.contains(part), "`{text}` lacks `{part}`");
+    };
+    refuse(&|v| v.exposure = -1.0, "view.exposure");
+    refuse(&|v| v.time = f64::INFINITY, "view.time");
+    refuse(&|v| v.sun.to_light = Vec3::ZERO, "view.sun.to_light");
+    refuse(&|v| v.sun.irradiance.x = f32::NAN, "view.sun.irradiance");
+    refuse(&|v| v.eye.frac.x = f32::NAN, "view.eye.frac");
+    refuse(&|v| v.eye.cell.y = 1 << 40, "altitude");
+    refuse(&|v| v.projection = veduta::glam::Mat4::ZERO, "view.projection");
+    refuse(&|v| v.jitter.x = 3.0, "view.jitter");
+}
+
+#[test]
+fn every_colour_format_gets_its_own_output() {
+    let view = frozen("V01", 0.0);
+    let formats = [
+        wgpu::TextureFormat::Rgba8Unorm,
+        wgpu::TextureFormat::Rgba8UnormSrgb,
+        HDR,
+    ];
+    let [unorm, srgb, hdr] = formats.map(|format| {
+        let mut land =
+            Landscape::new(&gpu().device, programs(), &targets(format), &LandscapeOptions {
+                preset: Preset::ThesisLow,
+                ..Default::default()
+            })
+            .unwrap();
+        draw(&mut land, &view, SMALL, format)
+    });
+    let mut worst = 0.0_f32;
+    for ((a, b), radiance) in unorm.pixels.iter().zip(&srgb.pixels).zip(&hdr.pixels) {
+        for c in 0..3 {
+            // The sRGB target stores what the other was given, up to one step of rounding.
+            assert!((a[c] - b[c]).abs() <= 1.01 / 255.0, "{a:?} {b:?}");
+            let mapped = 1.0 - (-radiance[c]).exp();
+            let encoded = if mapped <= 0.003_130_8 {
+                12.92 * mapped
+            } else {
+                1.055 * mapped.powf(1.0 / 2.4) - 0.055
+            };
+            worst = worst.max((a[c] - encoded).abs());
+        }
+    }
+    println!("largest difference from the encoded tone map: {:.3} of a step", worst * 255.0);
+    assert!(worst * 255.0 < 1.05, "dither moves by half a step and rounding by another");
+}

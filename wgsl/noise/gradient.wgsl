@@ -1,0 +1,196 @@
+//! Gradient (Perlin) noise: random unit vectors at the lattice points, joined by the quintic fade.
+//!
+//! With weights that sum to 1, |noise| is at most the root of the weighted mean of the squared distances to the corners,
+//! which is largest in the middle of the cell: sqrt(n)/2 in n dimensions. The unit vectors are scaled by the inverse,
+//! sqrt(2) in 2D and 2/sqrt(3) in 3D, so that the noise lies in [-1, 1] and could reach its ends in 2D.
+//!
+//! 2D directions are uniform on the circle: 23 bits of the hash are an angle within a quadrant, two more the signs. The
+//! sine and cosine are polynomials of ours; about the middle of the quadrant they serve both components, and the factor
+//! sqrt(2) is part of the rotation by 45 degrees. 3D directions are the 24 vertices of the two icosahedra with axes along
+//! the lattice's: vectors (0, +-a, +-b) and their permutations with a/b the golden ratio, a spherical 5-design. (The usual
+//! twelve edge centres are a 3-design: noise along the diagonals differs from noise along the axes.)
+//!
+//! source   Leitner2022 3.7; Perlin2002 Improving noise
+//! symbols  cell lattice point [cell] · frac position within the cell [cell] · seed selects one of 2^32 noises [1]
+#define_import_path veduta::noise::gradient
+
+#import veduta::hash::lattice::{lattice_hash_2d, lattice_hash_3d}
+#import veduta::noise::lattice::{split_2d, split_3d, fade_2d, fade_3d, fade_slope_2d, fade_slope_3d}
+
+const SIGN: u32 = 2147483648u;
+// The icosahedron's two coordinates times 2/sqrt(3).
+const LONG_SIDE: f32 = 0.98224694637684602;
+const SHORT_SIDE: f32 = 0.60706199820668622;
+
+/// The vector at a lattice point in 2D: a random direction, length sqrt(2).
+///
+/// With x in [-pi/4, pi/4] the angle from the middle of the quadrant, sqrt(2) (cos(pi/4 + x), sin(pi/4 + x)) is
+/// (cos x - sin x, cos x + sin x). Minimax polynomials in x / (pi/2), error 3e-8.
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  seed in [0, 4294967295] 1 lin
+/// range   [-1.4142136, 1.4142136] 1
+/// error   3e-7 abs of reference::noise::lattice_gradient_2d
+/// source  Leitner2022 3.7
+fn lattice_gradient_2d(cell: vec2<i32>, seed: u32) -> vec2<f32> {
+    let h = lattice_hash_2d(cell, seed).x;
+    let u = bitcast<f32>((h >> 9u) | 0x3f800000u) - 1.5;
+    let q = u * u;
+    let sine = u * (q * (q * (q * -0.00460214921281 + 0.0796802176478) - 0.645963477665) + 1.57079632195);
+    let cosine = q * (q * (q * -0.020408158393 + 0.253598571303) - 1.23369700742) + 0.999999972328;
+    return vec2<f32>(
+        bitcast<f32>(bitcast<u32>(cosine - sine) ^ (h << 31u)),
+        bitcast<f32>(bitcast<u32>(cosine + sine) ^ ((h << 30u) & SIGN)),
+    );
+}
+
+/// The vector at a lattice point in 3D: one of 24 directions, length 2/sqrt(3).
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  seed in [0, 4294967295] 1 lin
+/// range   [-0.98225, 0.98225] 1
+/// error   6e-8 abs of reference::noise::lattice_gradient_3d
+/// source  Leitner2022 3.7; departs: 24 directions
+fn lattice_gradient_3d(cell: vec3<i32>, seed: u32) -> vec3<f32> {
+    let h = lattice_hash_3d(cell, seed).x;
+    let swap = (h & 4u) != 0u;
+    let p = bitcast<f32>(bitcast<u32>(select(LONG_SIDE, SHORT_SIDE, swap)) ^ (h << 31u));
+    let q = bitcast<f32>(bitcast<u32>(select(SHORT_SIDE, LONG_SIDE, swap)) ^ ((h << 30u) & SIGN));
+    // Thirds of the word: the component that is 0.
+    let first = bitcast<i32>(h) < -715827882;
+    let second = bitcast<i32>(h) < 715827883;
+    return vec3<f32>(
+        select(select(p, q, second), 0.0, first),
+        select(select(q, 0.0, second), p, first),
+        select(select(0.0, p, second), q, first),
+    );
+}
+
+/// Gradient noise in 2D.
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  frac in [0, 1] cell lin
+/// domain  seed in [0, 4294967295] 1 lin
+/// range   [-1, 1] 1
+/// error   7e-7 abs of reference::noise::gradient_noise_2d
+/// source  Leitner2022 3.7
+fn gradient_noise_2d(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> f32 {
+    let p = split_2d(cell, frac);
+    let c = p.cell;
+    let t = p.frac;
+    let s = t - 1.0;
+    let n00 = dot(lattice_gradient_2d(c, seed), t);
+    let n10 = dot(lattice_gradient_2d(vec2<i32>(c.x + 1, c.y), seed), vec2<f32>(s.x, t.y));
+    let n01 = dot(lattice_gradient_2d(vec2<i32>(c.x, c.y + 1), seed), vec2<f32>(t.x, s.y));
+    let n11 = dot(lattice_gradient_2d(c + 1, seed), s);
+    let f = fade_2d(t);
+    let g = 1.0 - f;
+    return (n00 * g.x + n10 * f.x) * g.y + (n01 * g.x + n11 * f.x) * f.y;
+}
+
+/// Gradient noise in 3D.
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  frac in [0, 1] cell lin
+/// domain  seed in [0, 4294967295] 1 lin
+/// range   [-1, 1] 1
+/// error   7e-7 abs of reference::noise::gradient_noise_3d
+/// source  Leitner2022 3.7; departs: 24 directions
+fn gradient_noise_3d(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
+    let p = split_3d(cell, frac);
+    let c = p.cell;
+    let t = p.frac;
+    let s = t - 1.0;
+    let n000 = dot(lattice_gradient_3d(c, seed), t);
+    let n100 = dot(lattice_gradient_3d(vec3<i32>(c.x + 1, c.y, c.z), seed), vec3<f32>(s.x, t.y, t.z));
+    let n010 = dot(lattice_gradient_3d(vec3<i32>(c.x, c.y + 1, c.z), seed), vec3<f32>(t.x, s.y, t.z));
+    let n110 = dot(lattice_gradient_3d(vec3<i32>(c.x + 1, c.y + 1, c.z), seed), vec3<f32>(s.x, s.y, t.z));
+    let n001 = dot(lattice_gradient_3d(vec3<i32>(c.x, c.y, c.z + 1), seed), vec3<f32>(t.x, t.y, s.z));
+    let n101 = dot(lattice_gradient_3d(vec3<i32>(c.x + 1, c.y, c.z + 1), seed), vec3<f32>(s.x, t.y, s.z));
+    let n011 = dot(lattice_gradient_3d(vec3<i32>(c.x, c.y + 1, c.z + 1), seed), vec3<f32>(t.x, s.y, s.z));
+    let n111 = dot(lattice_gradient_3d(c + 1, seed), s);
+    let f = fade_3d(t);
+    let g = 1.0 - f;
+    let n0 = (n000 * g.x + n100 * f.x) * g.y + (n010 * g.x + n110 * f.x) * f.y;
+    let n1 = (n001 * g.x + n101 * f.x) * g.y + (n011 * g.x + n111 * f.x) * f.y;
+    return n0 * g.z + n1 * f.z;
+}
+
+/// Gradient noise in 2D and its gradient: (value, d/dx, d/dy), per cell.
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  frac in [0, 1] cell lin
+/// domain  seed in [0, 4294967295] 1 lin
+/// range   [-6, 6] 1
+/// error   2e-6 abs of reference::noise::gradient_noise_2d_slope
+/// source  Leitner2022 3.7; Quilez2017 Gradient noise derivatives
+fn gradient_noise_2d_slope(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> vec3<f32> {
+    let p = split_2d(cell, frac);
+    let c = p.cell;
+    let t = p.frac;
+    let s = t - 1.0;
+    let g00 = lattice_gradient_2d(c, seed);
+    let g10 = lattice_gradient_2d(vec2<i32>(c.x + 1, c.y), seed);
+    let g01 = lattice_gradient_2d(vec2<i32>(c.x, c.y + 1), seed);
+    let g11 = lattice_gradient_2d(c + 1, seed);
+    let n00 = dot(g00, t);
+    let n10 = dot(g10, vec2<f32>(s.x, t.y));
+    let n01 = dot(g01, vec2<f32>(t.x, s.y));
+    let n11 = dot(g11, s);
+    let f = fade_2d(t);
+    let g = 1.0 - f;
+    let n0 = n00 * g.x + n10 * f.x;
+    let n1 = n01 * g.x + n11 * f.x;
+    let across = vec2<f32>((n10 - n00) * g.y + (n11 - n01) * f.y, n1 - n0);
+    let mean = (g00 * g.x + g10 * f.x) * g.y + (g01 * g.x + g11 * f.x) * f.y;
+    return vec3<f32>(n0 * g.y + n1 * f.y, mean + fade_slope_2d(t) * across);
+}
+
+/// Gradient noise in 3D and its gradient: (value, d/dx, d/dy, d/dz), per cell.
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  frac in [0, 1] cell lin
+/// domain  seed in [0, 4294967295] 1 lin
+/// range   [-6, 6] 1
+/// error   2e-6 abs of reference::noise::gradient_noise_3d_slope
+/// source  Leitner2022 3.7; Quilez2017 Gradient noise derivatives
+fn gradient_noise_3d_slope(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> vec4<f32> {
+    let p = split_3d(cell, frac);
+    let c = p.cell;
+    let t = p.frac;
+    let s = t - 1.0;
+    let g000 = lattice_gradient_3d(c, seed);
+    let g100 = lattice_gradient_3d(vec3<i32>(c.x + 1, c.y, c.z), seed);
+    let g010 = lattice_gradient_3d(vec3<i32>(c.x, c.y + 1, c.z), seed);
+    let g110 = lattice_gradient_3d(vec3<i32>(c.x + 1, c.y + 1, c.z), seed);
+    let g001 = lattice_gradient_3d(vec3<i32>(c.x, c.y, c.z + 1), seed);
+    let g101 = lattice_gradient_3d(vec3<i32>(c.x + 1, c.y, c.z + 1), seed);
+    let g011 = lattice_gradient_3d(vec3<i32>(c.x, c.y + 1, c.z + 1), seed);
+    let g111 = lattice_gradient_3d(c + 1, seed);
+    let n000 = dot(g000, t);
+    let n100 = dot(g100, vec3<f32>(s.x, t.y, t.z));
+    let n010 = dot(g010, vec3<f32>(t.x, s.y, t.z));
+    let n110 = dot(g110, vec3<f32>(s.x, s.y, t.z));
+    let n001 = dot(g001, vec3<f32>(t.x, t.y, s.z));
+    let n101 = dot(g101, vec3<f32>(s.x, t.y, s.z));
+    let n011 = dot(g011, vec3<f32>(t.x, s.y, s.z));
+    let n111 = dot(g111, s);
+    let f = fade_3d(t);
+    let g = 1.0 - f;
+    let n00 = n000 * g.x + n100 * f.x;
+    let n10 = n010 * g.x + n110 * f.x;
+    let n01 = n001 * g.x + n101 * f.x;
+    let n11 = n011 * g.x + n111 * f.x;
+    let n0 = n00 * g.y + n10 * f.y;
+    let n1 = n01 * g.y + n11 * f.y;
+    let along_x0 = (n100 - n000) * g.y + (n110 - n010) * f.y;
+    let along_x1 = (n101 - n001) * g.y + (n111 - n011) * f.y;
+    let across = vec3<f32>(
+        along_x0 * g.z + along_x1 * f.z,
+        (n10 - n00) * g.z + (n11 - n01) * f.z,
+        n1 - n0,
+    );
+    let mean0 = (g000 * g.x + g100 * f.x) * g.y + (g010 * g.x + g110 * f.x) * f.y;
+    let mean1 = (g001 * g.x + g101 * f.x) * g.y + (g011 * g.x + g111 * f.x) * f.y;
+    return vec4<f32>(n0 * g.z + n1 * f.z, mean0 * g.z + mean1 * f.z + fade_slope_3d(t) * across);
+}
