@@ -212,15 +212,6 @@ pub struct ThreeLights {
     pub bounce_color: [f64; 3],
 }
 
-/// The three lights from the colours of sun, sky and terrain.
-pub fn mix_three_lights(sun_color: [f64; 3], sky_color: [f64; 3], terrain_color: [f64; 3], ambient: f64, bounce: f64) -> ThreeLights {
-    ThreeLights {
-        sun_color,
-        sky_color: scale(sky_color, ambient),
-        bounce_color: std::array::from_fn(|k| bounce * sun_color[k] * terrain_color[k]),
-    }
-}
-
 /// Horizontal direction from which the bounce light comes.
 pub fn bounce_direction(to_sun: [f64; 3]) -> [f64; 3] {
     let l = to_sun[0].hypot(to_sun[2]).max(1e-5);

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod atmosphere;
+mod clouds;
 mod common;
 mod downstream;
 mod eval;
@@ -9,5 +10,6 @@ mod examples;
 mod getting_started;
 mod phase;
 mod planet;
+mod terrain;
 mod tone_map;
 mod validators;

@@ -36,7 +36,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::planet::shell::{ground_distance, up_at, direction_cosine_along}
 #import veduta::terrain::shading::{ThreeLights, shade_three_lights}
 #ifdef ATMOSPHERE
-#import veduta::atmosphere::march::{Atmosphere, SkyLight, march_sky, sun_transmittance}
+#import veduta::atmosphere::march::{Atmosphere, march_sky, sun_transmittance}
 #import veduta::atmosphere::sun_disc::{sun_disc}
 #endif
 #ifdef TERRAIN
