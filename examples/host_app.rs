@@ -3,8 +3,7 @@
 
 use veduta::{Landscape, LandscapeOptions, Preset, Targets, View, wgpu};
 
-const WIDTH: u32 = 128;
-const HEIGHT: u32 = 72;
+const SIZE: [u32; 2] = [128, 72];
 
 /// Draws one frame and returns its pixels: red, green, blue and alpha, row by row.
 pub fn draw() -> Result<Vec<u8>, Box<dyn std::error::Error>> {
@@ -13,8 +12,8 @@ pub fn draw() -> Result<Vec<u8>, Box<dyn std::error::Error>> {
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("picture"),
         size: wgpu::Extent3d {
-            width: WIDTH,
-            height: HEIGHT,
+            width: SIZE[0],
+            height: SIZE[1],
             depth_or_array_layers: 1,
         },
         mip_level_count: 1,
@@ -38,7 +37,8 @@ pub fn draw() -> Result<Vec<u8>, Box<dyn std::error::Error>> {
 
     // Each frame: `prepare` uploads what has changed, `composite` draws in the host's own pass.
     let mut view = View::default();
-    view.look(0.5, 0.1, 1.0, WIDTH as f32 / HEIGHT as f32);
+    view.eye.cell.y = 2500; // metres
+    view.look(0.5, -0.1, 1.0, SIZE[0] as f32 / SIZE[1] as f32);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let uploaded = landscape.prepare(&gpu.device, &gpu.queue, &mut encoder, &view)?;
     let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -57,14 +57,14 @@ pub fn draw() -> Result<Vec<u8>, Box<dyn std::error::Error>> {
     // A host with a window presents now; this one reads the picture back.
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("picture"),
-        size: u64::from(4 * WIDTH * HEIGHT),
+        size: u64::from(4 * SIZE[0] * SIZE[1]),
         usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
         mapped_at_creation: false,
     });
     let rows = wgpu::TexelCopyBufferInfo {
         buffer: &buffer,
         layout: wgpu::TexelCopyBufferLayout {
-            bytes_per_row: Some(4 * WIDTH),
+            bytes_per_row: Some(4 * SIZE[0]),
             ..Default::default()
         },
     };
