@@ -1,6 +1,6 @@
 //! Fractal sums against their twins and their defining properties (rows L07 to L10).
 
-use crate::twins::{POINTS, Truth, cell, check, float, floats, random_cell, random_frac};
+use crate::sweep::{POINTS, Truth, cell, check, float, floats, random_cell, random_frac};
 use crate::common::{Random, evaluator};
 use veduta::reference::fractal::*;
 use veduta::reference::noise::{gradient_noise_2d, octave_2d, octave_seed};

@@ -1,6 +1,6 @@
 //! Lattices, value and gradient noise against their twins (rows L05, L06).
 
-use crate::twins::{POINTS, Truth, cell, check, float, floats, random_cell, random_frac};
+use crate::sweep::{POINTS, Truth, cell, check, float, floats, random_cell, random_frac};
 use crate::common::{Random, evaluator};
 use veduta::reference::noise::*;
 
@@ -147,7 +147,7 @@ fn lattice_positions_on_the_device_equal_their_twins() {
     const F2: &str = "vec2f(in.f[3], in.f[4])";
     const F3: &str = "vec3f(in.f[3], in.f[4], in.f[5])";
     let stated =
-        |name: &str| crate::twins::header_error(&format!("veduta::noise::lattice::{name}"));
+        |name: &str| crate::sweep::header_error(&format!("veduta::noise::lattice::{name}"));
     // The argument itself is rounded twice here, by 2^-18 each time.
     check(
         "split_2d",
@@ -297,7 +297,7 @@ fn row_l05_value_noise() {
     use veduta::reference::hash::{lattice_hash_2d, lattice_hash_3d, unit_float};
     let prefix = "veduta::noise::value::";
     let of = |name: &str| format!("{prefix}{name}");
-    let near_ends = |s: crate::twins::Summary| {
+    let near_ends = |s: crate::sweep::Summary| {
         assert!(s.low >= 0.0 && s.high <= 1.0, "{s:?}");
         assert!(s.low < 0.001 && s.high > 0.999, "{s:?}");
     };
@@ -412,7 +412,7 @@ fn row_l05_value_noise() {
 fn row_l06_gradient_noise() {
     let prefix = "veduta::noise::gradient::";
     let of = |name: &str| format!("{prefix}{name}");
-    let inside = |s: crate::twins::Summary| {
+    let inside = |s: crate::sweep::Summary| {
         assert!(s.low >= -1.0 && s.high <= 1.0, "{s:?}");
         assert!(s.low < -0.9 && s.high > 0.9, "{s:?}");
     };

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use veduta::Preset;
-use veduta_compose::gate::{Target as Writer, Written, write_target};
+use veduta_compose::gate::{Target as Writer, write_target};
 use veduta_compose::keys::Value;
 use veduta_compose::link::Linker;
 use veduta_compose::settings::{Presets, Settings, resolve, split_set};
@@ -135,7 +135,11 @@ pub fn run(args: &ComposeArgs) -> Result<(), CliError> {
             stage.kind,
             args.target.ending()
         );
-        texts.push((name, Written::into_bytes(written)));
+        let mut bytes = written.into_bytes();
+        if args.target != Target::Spirv && !bytes.ends_with(b"\n") {
+            bytes.push(b'\n');
+        }
+        texts.push((name, bytes));
     }
     match &args.out {
         None => {

@@ -94,6 +94,25 @@ fn integers_and_vectors_go_through_npy() {
 }
 
 #[test]
+fn expressions_without_a_column_have_values() {
+    let dir = folder("eval_constants");
+    std::fs::write(dir.join("rows.csv"), "1\n2\n").unwrap();
+    for (expression, wanted) in [
+        ("1.5", "1.5\n1.5\n"),
+        ("7", "7\n7\n"),
+        ("vec2(1u, 2u)", "1,2\n1,2\n"),
+        ("vec4<bool>()", "0,0,0,0\n0,0,0,0\n"),
+    ] {
+        veduta(
+            &dir,
+            &["eval", "--expr", expression, "--columns", "f", "--in", "rows.csv", "--out", "out.csv"],
+        )
+        .good();
+        assert_eq!(std::fs::read_to_string(dir.join("out.csv")).unwrap(), wanted, "{expression}");
+    }
+}
+
+#[test]
 fn one_dimension_no_rows_and_every_type_are_read() {
     let dir = folder("eval_shapes");
     write_npy(&dir.join("one.npy"), &[3], &[0.5_f32, -1.0, f32::INFINITY]);
@@ -171,7 +190,7 @@ fn faults_of_the_expression_are_told() {
         veduta(&dir, &args)
     };
     eval(&["--expr", "in.f[0] +"]).bad(1, &["expression:"]);
-    eval(&["--expr", "mat2x2<f32>()"]).bad(1, &["scalar or a vector"]);
+    eval(&["--expr", "mat2x2<f32>(in.f[0], 1.0, 2.0, 3.0)"]).bad(1, &["scalar or a vector"]);
     eval(&["--expr", "nois(in.f[0])"]).bad(1, &["nois"]);
     eval(&["--expr", "1.0", "--import", "veduta::lighting::phase::phase_rayleig"])
         .bad(1, &["phase_rayleig", "did you mean `phase_rayleigh`"]);

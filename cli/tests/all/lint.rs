@@ -32,7 +32,7 @@ fn every_fault_has_its_place() {
     // File, text at the place, a word of the message.
     for (file, at, word) in [
         ("presets/coarse.ron", "30", "30"),
-        ("presets/coarse.ron", "\"OCTAVE\"", "OCTAVE"),
+        ("presets/coarse.ron", "\"OCTAVE\"", "`OCTAVE`"),
         ("presets/views/hut.ron", "200.0", "pitch_deg"),
         ("shaders/hills.wgsl", "fbm_2}", "fbm_2"),
         ("shaders/map.sp", "TERRACE", "TERRACE"),
@@ -48,7 +48,7 @@ fn every_fault_has_its_place() {
         assert!(rest.starts_with(at), "{fault} points at {rest}");
     }
     let text = veduta(&dir, &["lint", "shaders", "presets"]).bad(1, &["faults found"]);
-    assert!(text.out.contains("shaders/hills.wgsl:6:"), "{}", text.out);
+    assert!(text.out.contains("shaders/hills.wgsl:4:"), "{}", text.out);
     assert!(text.out.contains("#import veduta::fractal::fbm::{fbm_2}\n"), "{}", text.out);
 }
 
