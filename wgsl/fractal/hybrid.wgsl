@@ -4,7 +4,7 @@
 //! symbols  octaves number of octaves [1] · hurst Hurst exponent [1] · offset moves the noise towards positive values [1]
 #define_import_path veduta::fractal::hybrid
 
-#import veduta::noise::lattice::{split_2d, finer_2d, shifted_2d, octave_seed, octave_frequency}
+#import veduta::noise::lattice::{split_2d, finer_2d, shifted_2d, octave_seed, octave_frequency, octave_fall}
 #import veduta::noise::gradient::{gradient_at_2d, gradient_at_2d_slope}
 
 /// Hybrid multifractal of gradient noise in 2D. Musgrave's start values: hurst 0.25, offset 0.7.
@@ -26,13 +26,13 @@ fn hybrid_multifractal_2d(
     offset: f32,
     seed: u32,
 ) -> f32 {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = 1.0;
     var sum = 0.0;
     for (var i = 0; i < octaves; i++) {
-        let q = shifted_2d(p);
+        let q = shifted_2d(p, i);
         p = finer_2d(p);
         let signal = amplitude * (gradient_at_2d(q, octave_seed(seed, i)) + offset);
         weight = min(weight, 1.0) * signal;
@@ -64,13 +64,13 @@ fn hybrid_multifractal_2d_slope(
     offset: f32,
     seed: u32,
 ) -> vec3<f32> {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = vec3<f32>(1.0, 0.0, 0.0);
     var sum = vec3<f32>(0.0);
     for (var i = 0; i < octaves; i++) {
-        let q = shifted_2d(p);
+        let q = shifted_2d(p, i);
         p = finer_2d(p);
         let n = gradient_at_2d_slope(q, octave_seed(seed, i));
         let signal = amplitude * vec3<f32>(n.x + offset, octave_frequency(i) * n.yz);
