@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::error::Error;
 use crate::program::{PipelineOptions, ProgramSet, ReadyPipeline, Value};
-use crate::programs::{Anchors, View as ViewBlock};
+use crate::programs::blocks::{Anchors, View as ViewBlock};
 use crate::settings::{Preset, Settings};
 use crate::view::{View, WorldPos};
 

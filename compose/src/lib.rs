@@ -23,3 +23,6 @@ pub use diag::{Diag, Diags};
 pub use keys::Keys;
 pub use library::Library;
 pub use link::{Def, Defs, LinkInput, Linker};
+
+/// The version of naga that this crate links and writes with.
+pub use naga;

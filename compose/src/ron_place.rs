@@ -333,16 +333,19 @@ impl<'a> Tokens<'a> {
                 let word = self.word();
                 let end = self.at;
                 self.blanks();
-                if self.peek() == Some('(') {
-                    if word == "Some" {
-                        self.bump();
-                        let inner = self.value(depth + 1);
+                if word == "Some" {
+                    // With `implicit_some` the parentheses may be missing.
+                    let closed = self.eat('(');
+                    let inner = self.value(depth + 1);
+                    if closed {
                         self.blanks();
                         self.eat(',');
                         self.blanks();
                         self.eat(')');
-                        return Shape::Wrapped(Box::new(inner));
                     }
+                    return Shape::Wrapped(Box::new(inner));
+                }
+                if self.peek() == Some('(') {
                     return self.parens(depth);
                 }
                 self.at = end;
@@ -428,27 +431,18 @@ impl<'a> Tokens<'a> {
 
     /// A number, a word or a raw name; stops at blanks, brackets, commas, colons and comments.
     fn word(&mut self) -> &'a str {
-        let rest = self.rest();
-        let end = rest
-            .char_indices()
-            .find(|&(at, c)| {
-                c.is_whitespace()
-                    || matches!(c, '\u{200e}' | '\u{200f}')
-                    || matches!(
-                        c,
-                        ',' | ':' | '(' | ')' | '[' | ']' | '{' | '}' | '"' | '/'
-                    )
-                    // `b'x'` is a number for ron.
-                    || (c == '\'' && at != 1)
-            })
-            .map_or(rest.len(), |(at, _)| at);
-        if rest.starts_with("b'") {
-            self.at += 1;
-            self.character();
-            return &self.text[self.at - 1..self.at];
+        let start = self.at;
+        while let Some(c) = self.peek() {
+            match c {
+                // `b'x'` is a number for ron.
+                '\'' if self.text[start..self.at].ends_with('b') => self.character(),
+                ',' | ':' | '(' | ')' | '[' | ']' | '{' | '}' | '"' | '\'' | '/' => break,
+                '\u{200e}' | '\u{200f}' => break,
+                c if c.is_whitespace() => break,
+                _ => self.bump(),
+            }
         }
-        self.at += end;
-        &rest[..end]
+        &self.text[start..self.at]
     }
 
     /// Strings with a prefix: `r"..."`, `r#"..."#`, `b"..."`, `br"..."`, `br#"..."#`.

@@ -810,7 +810,7 @@ impl<'a> Reader<'a> {
                 Level::Top
             }
             Level::Geometry(geometry, opened) => {
-                self.end_geometry(geometry, opened);
+                self.end_geometry(*geometry, opened);
                 Level::Top
             }
             Level::Params(geometry, opened, _) => Level::Geometry(geometry, opened),
@@ -851,7 +851,7 @@ impl<'a> Reader<'a> {
         ));
     }
 
-    fn end_geometry(&mut self, geometry: Box<Geometry>, opened: usize) {
+    fn end_geometry(&mut self, geometry: Geometry, opened: usize) {
         if geometry.pieces.is_empty() && !self.is_faulty_since(opened) {
             self.fault(
                 opened,
@@ -863,7 +863,7 @@ impl<'a> Reader<'a> {
             self.fault_with(opened, "a second `GEOMETRY` in one program", &[note]);
             return;
         }
-        self.geometry = Some((*geometry, opened));
+        self.geometry = Some((geometry, opened));
     }
 
     fn open(&mut self, level: Level, at: usize, name: &'a str) -> Level {
@@ -962,7 +962,7 @@ impl<'a> Reader<'a> {
             match level {
                 Level::Stage(kind, opened, pieces) => self.end_stage(kind, opened, pieces),
                 Level::Geometry(geometry, opened) | Level::Params(geometry, opened, _) => {
-                    self.end_geometry(geometry, opened);
+                    self.end_geometry(*geometry, opened);
                 }
                 Level::Top | Level::Define(_) => {}
             }

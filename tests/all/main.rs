@@ -2,8 +2,19 @@
 
 mod accuracy;
 mod atmosphere;
+mod clouds;
 mod common;
+mod downstream;
 mod eval;
+mod examples;
+mod fractal;
+mod getting_started;
+mod hash;
+mod landscape;
+mod noise;
 mod phase;
 mod planet;
+mod sweep;
+mod terrain;
 mod tone_map;
+mod validators;

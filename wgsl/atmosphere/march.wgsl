@@ -90,7 +90,7 @@ fn sun_transmittance(atmosphere: Atmosphere, h: f32, mu: f32, steps: i32) -> vec
 /// domain  steps in [1, 1024] 1 lin
 /// domain  light_steps in [1, 512] 1 lin
 /// range   [0, 100] 1/sr
-/// error   2e-5 abs of reference::atmosphere::march_sky
+/// error   1e-5 abs of reference::atmosphere::march_sky
 /// source  Leitner2022 alg. 7; departs: half a step less attenuation, planet shadow
 fn march_sky(atmosphere: Atmosphere, eye_altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, distance: f32, steps: i32, light_steps: i32) -> SkyLight {
     let radius = atmosphere.ground_radius;

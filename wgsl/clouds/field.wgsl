@@ -47,10 +47,10 @@ struct CloudLayer {
 /// Density after the noise value `n` has been filled up by `uniformity` and cut by `coverage`: no cloud at coverage 0.
 ///
 /// domain  n in [0, 1] 1 lin
-/// domain  coverage in [0, 1] 1 lin
+/// domain  coverage in [0.01, 1] 1 lin
 /// domain  uniformity in [0, 1] 1 lin
 /// range   [0, 1] 1
-/// error   1e-6 abs of reference::clouds::shape_coverage
+/// error   1e-5 abs of reference::clouds::shape_coverage
 /// monotone n
 /// source  the usual remapping max(0, (n - (1 - coverage)) / coverage); floor 1e-6 under the divisor
 fn shape_coverage(n: f32, coverage: f32, uniformity: f32) -> f32 {
@@ -63,7 +63,7 @@ fn shape_coverage(n: f32, coverage: f32, uniformity: f32) -> f32 {
 /// domain  relative in [-1e5, 1e5] m lin
 /// domain  altitude in [0, 2e4] m lin
 /// range   [0, 1] 1
-/// error   1e-4 abs of reference::clouds::cloud_density
+/// error   2e-5 abs of reference::clouds::cloud_density
 /// source  Leitner2022 ch. 4.5 (six octaves of value noise)
 fn cloud_density(layer: CloudLayer, relative: vec3<f32>, altitude: f32) -> f32 {
     let place = layer.frac + vec3<f32>(relative.x, altitude, relative.z) / layer.wavelength;

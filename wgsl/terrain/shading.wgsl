@@ -13,20 +13,6 @@ struct ThreeLights {
     bounce_color: vec3<f32>,
 }
 
-/// The three lights from the colours of sun, sky and terrain: ambient = `ambient` * sky, bounce = `bounce` * sun * terrain.
-///
-/// domain  sun_color in [0, 10] 1 lin
-/// domain  sky_color in [0, 10] 1 lin
-/// domain  terrain_color in [0, 1] 1 lin
-/// domain  ambient in [0, 1] 1 lin
-/// domain  bounce in [0, 1] 1 lin
-/// range   [0, 10] 1
-/// error   3e-7 rel of reference::terrain::mix_three_lights
-/// source  Leitner2022 table of lights; the colours' mixture as a product: ours
-fn mix_three_lights(sun_color: vec3<f32>, sky_color: vec3<f32>, terrain_color: vec3<f32>, ambient: f32, bounce: f32) -> ThreeLights {
-    return ThreeLights(sun_color, ambient * sky_color, bounce * sun_color * terrain_color);
-}
-
 /// Horizontal direction from which the bounce light comes, away from the sun; it shrinks to zero with the sun in the zenith.
 ///
 /// domain  to_sun in [-1, 1] 1 lin
@@ -43,7 +29,7 @@ fn bounce_direction(to_sun: vec3<f32>) -> vec3<f32> {
 /// domain  to_sun in [-1, 1] 1 lin
 /// domain  shadow in [0, 1] 1 lin
 /// range   [0, 30] 1
-/// error   1e-6 abs of reference::terrain::shade_three_lights
+/// error   5e-7 abs of reference::terrain::shade_three_lights
 /// source  Leitner2022 eq. 4.1; departs: clamped at 0
 fn shade_three_lights(lights: ThreeLights, normal: vec3<f32>, to_sun: vec3<f32>, shadow: f32) -> vec3<f32> {
     let direct = max(dot(normal, to_sun), 0.0) * shadow;

@@ -18,6 +18,10 @@ struct TerrainShadow {
 /// and between them the smallest sharpness * clearance / t on the way, so that shadows harden towards their contact.
 /// The ray starts `bias` metres along the normal.
 ///
+/// domain  ground_radius in [3e6, 1e8] m log
+/// domain  eye_altitude in [0, 1e5] m lin
+/// domain  normal in [-1, 1] 1 lin
+/// domain  to_sun in [-1, 1] 1 lin
 /// domain  relative in [-1e5, 1e5] m lin
 /// domain  bias in [0, 1e3] m lin
 /// domain  far in [1, 1e5] m log
@@ -27,7 +31,7 @@ struct TerrainShadow {
 /// domain  max_steps in [0, 10000] 1 lin
 /// domain  octaves in [1, 16] 1 lin
 /// range   [0, 1] 1
-/// error   1e-2 abs of reference::terrain::soft_shadow
+/// error   3e-3 abs of reference::terrain::soft_shadow
 /// source  Leitner2022 ch. 4.2.5; departs: clearance over distance in place of the bare clearance, which near the
 ///         surface is small on every ray
 fn soft_shadow(terrain: Terrain, ground_radius: f32, eye_altitude: f32, relative: vec3<f32>, normal: vec3<f32>,

@@ -1,20 +1,9 @@
 //! The header grammar: what is read, its documentation, and every fault with its message.
 
+use super::blocks;
 use veduta_compose::header::{Bound, ErrorKind, Headers, Param, Spacing, parse_headers};
 
 const GRAMMAR: &str = include_str!("../../../../docs/header-grammar.md");
-
-/// The fenced blocks of a kind in a document.
-fn blocks<'a>(document: &'a str, kind: &str) -> Vec<&'a str> {
-    let fence = format!("```{kind}\n");
-    document
-        .match_indices(&fence)
-        .map(|(at, _)| {
-            let block = &document[at + fence.len()..];
-            &block[..block.find("```").unwrap()]
-        })
-        .collect()
-}
 
 fn read(text: &str) -> Headers {
     parse_headers("k.wgsl", text).unwrap_or_else(|e| panic!("{e}"))

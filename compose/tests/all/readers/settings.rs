@@ -1,5 +1,6 @@
 //! Keys, presets, scenes, views and their precedence, and every fault with its message.
 
+use super::blocks;
 use std::collections::{BTreeMap, BTreeSet};
 
 use veduta_compose::diag::Diags;
@@ -764,4 +765,27 @@ fn places_are_found_in_any_notation() {
         (at(&["e"]), at(&["f"]), at(&["g"])),
         ("b\"}\"", "'\\''", "\"\\\\\"")
     );
+}
+
+#[test]
+fn the_examples_of_the_documentation_are_read() {
+    let document = include_str!("../../../../docs/presets.md");
+    let of = |kind: &str| {
+        let found = blocks(document, &format!("ron {kind}"));
+        assert!(!found.is_empty(), "{kind}");
+        found
+    };
+    let keys = Keys::load(&[("keys.ron", of("keys")[0])]).unwrap_or_else(|e| panic!("{e}"));
+    let presets = of("preset");
+    let presets = Presets::load(
+        &keys,
+        &[("base", "a", presets[0]), ("low", "b", presets[1])],
+    )
+    .unwrap_or_else(|e| panic!("{e}"));
+    let scene = Scene::parse(&keys, "s", "s", of("scene")[0]).unwrap_or_else(|e| panic!("{e}"));
+    View::parse("v", "v", of("view")[0]).unwrap_or_else(|e| panic!("{e}"));
+    let settings = resolve(&keys, &presets, "low", Some(&scene), &[]).unwrap();
+    assert_eq!(settings.values["CLOUD_STEPS"], Value::Int(32));
+    assert_eq!(settings.values["CLOUD_COVERAGE"], Value::Float(0.8));
+    assert_eq!(settings.flags().len(), 1);
 }

@@ -1,5 +1,6 @@
 //! The `.sp` reader: checklist rows 1 to 3 of the weather source, and every fault with its message.
 
+use super::blocks;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -749,4 +750,26 @@ fn several_faults_are_reported_together_in_the_order_of_the_file() {
 fn a_hostile_file_is_given_up_after_a_hundred_faults() {
     let faults = parse("a.sp", &"#X{}#".repeat(100_000)).unwrap_err();
     assert_eq!(faults.0.len(), 100);
+}
+
+#[test]
+fn the_example_of_the_documentation_is_read() {
+    let document = include_str!("../../../../docs/sp-format.md");
+    let examples = blocks(document, "sp");
+    assert_eq!(examples.len(), 1);
+    let program = parse("a.sp", examples[0]).unwrap_or_else(|e| panic!("{e}"));
+    let compute = program
+        .stitch(StageKind::Compute, &mut |path| {
+            assert_eq!(path, "noise/octaves.wgsl");
+            Ok("fn octaves(x: vec2f) -> f32 { return x.x; }".into())
+        })
+        .unwrap();
+    validate("Fill", &compute.text.replace("#{TILE}", "8"));
+    for tag in [
+        "PROGRAM", "DEFINE", "VERTEX", "FRAGMENT", "COMPUTE", "GEOMETRY", "CODE", "SRC", "USE",
+        "PARAMS",
+    ] {
+        assert!(document.contains(&format!("`{tag}`")), "{tag}");
+        assert!(document.contains(&format!("\"#{tag}\"")), "{tag}");
+    }
 }
