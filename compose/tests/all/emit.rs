@@ -245,11 +245,35 @@ fn child_of_a_users_build() {
         error,
         "build.rs: there is no preset `thesis_lo`\nnote: did you mean `thesis_low`?"
     );
-    let output = Build::new()
-        .programs(fixture("project/shaders"))
-        .run()
-        .unwrap();
-    // Without a scene a program is composed with the preset's own flags.
+    // Keys beside the shaders count, and a user's override need not be a key.
+    let own = Path::new(env!("CARGO_TARGET_TMPDIR")).join("own_shaders");
+    std::fs::create_dir_all(&own).unwrap();
+    std::fs::copy(fixture("project/own_keys.ron"), own.join("keys.ron")).unwrap();
+    std::fs::copy(fixture("project/own.sp"), own.join("own.sp")).unwrap();
+    let build = Build::new().programs(&own).variant("own", ["RIPPLES"]);
+    let output = build.run().unwrap_or_else(|diags| panic!("{diags}"));
+    assert!(output.rust.contains("\"RIPPLES\""));
     assert_eq!(output.default_preset, "thesis");
-    assert_eq!(output.programs.len(), 2);
+    let features: Vec<_> = output
+        .programs
+        .iter()
+        .map(|p| (p.program.as_str(), p.features.join(" ")))
+        .collect();
+    assert_eq!(features, [("own", "".into()), ("own", "RIPPLES".into())]);
+    assert_eq!(output.programs[1].overrides[0].name, "FREQUENCY");
+    let error = build
+        .clone()
+        .variant("owm", [])
+        .run()
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        error,
+        "build.rs: there is no program `owm`\nnote: did you mean `own`?"
+    );
+    let error = build.claim("f61").run().unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "build.rs: there is no capability `f61` to claim\nnote: known are `f16` and `subgroups`"
+    );
 }

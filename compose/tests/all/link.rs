@@ -54,6 +54,49 @@ fn links_and_strips() {
     );
 }
 
+#[test]
+fn imports_in_branches_that_exclude_each_other() {
+    let library = library(&[
+        HASH,
+        (
+            "other.wgsl",
+            "#define_import_path t::other\nfn pcg(x: u32) -> u32 { return x + 77u; }\n",
+        ),
+        (
+            "either.wgsl",
+            "#define_import_path t::either\n#ifdef WATER\n#import t::other::{pcg}\n#else\n#import t::hash::{pcg}\n#endif\nfn either(x: u32) -> u32 { return pcg(x); }\n",
+        ),
+    ]);
+    let mut composer =
+        veduta_compose::Composer::new(&library, veduta_compose::Keys::default()).flags(["WATER"]);
+    assert_eq!(composer.check_modules().to_string(), "");
+    let text =
+        "#import t::either::{either}\n@compute @workgroup_size(1) fn main() { _ = either(1u); }";
+    let mut link = |defs: &Defs| {
+        let module = composer
+            .linker()
+            .link(&LinkInput {
+                text,
+                file: "main.wgsl",
+                defs,
+                plug_ins: &[],
+            })
+            .unwrap_or_else(|diags| panic!("{diags}"));
+        finish(module, naga::valid::Capabilities::empty())
+            .unwrap()
+            .wgsl
+    };
+    let (dry, wet) = (Defs::new(), Defs::from([("WATER".to_owned(), Def::Flag)]));
+    let first = link(&dry);
+    assert!(first.contains("PRIME") && !first.contains("77u"), "{first}");
+    let second = link(&wet);
+    assert!(
+        second.contains("77u") && !second.contains("PRIME"),
+        "{second}"
+    );
+    assert_eq!(first, link(&dry));
+}
+
 /// What WGSL and the preprocessor are made of.
 const TOKENS: [&str; 64] = [
     "#import ",
