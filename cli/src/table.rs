@@ -289,7 +289,8 @@ fn float_bits(value: f64, exact: Option<f32>, ty: Column) -> Result<u32, Misfit>
     }
     // i64 holds every value that can pass, and the comparison with 2^62 is exact.
     if value.fract() == 0.0 && value.abs() < 4.6e18 {
-        return integer_bits(value as i64, ty).map_err(|(_, needed)| (format!("{value:?}"), needed));
+        return integer_bits(value as i64, ty)
+            .map_err(|(_, needed)| (format!("{value:?}"), needed));
     }
     misfit()
 }
@@ -297,9 +298,7 @@ fn float_bits(value: f64, exact: Option<f32>, ty: Column) -> Result<u32, Misfit>
 fn integer_bits(value: i64, ty: Column) -> Result<u32, Misfit> {
     let misfit = |_| (value.to_string(), whole_number_needed(ty));
     match ty {
-        Column::I => i32::try_from(value)
-            .map(i32::cast_unsigned)
-            .map_err(misfit),
+        Column::I => i32::try_from(value).map(i32::cast_unsigned).map_err(misfit),
         Column::U => u32::try_from(value).map_err(misfit),
         Column::F => Ok((value as f32).to_bits()),
     }
@@ -484,9 +483,18 @@ mod tests {
                 &[],
             ),
             npy("{'descr': '<f8', 'fortran_order': 3, 'shape': (1,)}", &[]),
-            npy("{'descr': '<f8', 'fortran_order': False, 'shape': (-1,)}", &[]),
-            npy("{'descr': '<f16', 'fortran_order': False, 'shape': (1,)}", &[0; 16]),
-            npy("{'descr': '|O', 'fortran_order': False, 'shape': (1,)}", &[0; 8]),
+            npy(
+                "{'descr': '<f8', 'fortran_order': False, 'shape': (-1,)}",
+                &[],
+            ),
+            npy(
+                "{'descr': '<f16', 'fortran_order': False, 'shape': (1,)}",
+                &[0; 16],
+            ),
+            npy(
+                "{'descr': '|O', 'fortran_order': False, 'shape': (1,)}",
+                &[0; 8],
+            ),
         ] {
             assert!(matches!(
                 Table::from_npy(path, &bytes, 1),
@@ -529,11 +537,17 @@ mod tests {
             Ok(f32::INFINITY.to_bits())
         );
         let nan = f32::from_bits(0x7fc0_1234);
-        assert_eq!(float_bits(f64::from(nan), Some(nan), Column::F), Ok(0x7fc0_1234));
+        assert_eq!(
+            float_bits(f64::from(nan), Some(nan), Column::F),
+            Ok(0x7fc0_1234)
+        );
         assert_eq!(text_bits("1e3", Column::I), Ok(1000));
         assert_eq!(text_bits("-7", Column::I), Ok((-7_i32).cast_unsigned()));
         assert!(text_bits("1e39", Column::F).is_err());
-        assert_eq!(text_bits("-inf", Column::F), Ok(f32::NEG_INFINITY.to_bits()));
+        assert_eq!(
+            text_bits("-inf", Column::F),
+            Ok(f32::NEG_INFINITY.to_bits())
+        );
         assert!(text_bits("", Column::F).is_err());
         assert!(text_bits("9007199254740993", Column::U).is_err());
     }

@@ -206,7 +206,10 @@ pub fn compose(args: &ComposeArgs) -> Result<(Composed, Settings), CliError> {
             return Err(CliError::argument(
                 "--scene",
                 &scene.name,
-                format!("a scene of the program `{name}`, not of `{}`", scene.program),
+                format!(
+                    "a scene of the program `{name}`, not of `{}`",
+                    scene.program
+                ),
             ));
         }
     }
