@@ -170,21 +170,13 @@ impl Table {
         }
         let big = ty.endianness() == npyz::Endianness::Big;
         let cells = match (kind, width) {
-            (npyz::TypeChar::Float, 4) => Cells::F32(
-                words::<4>(rest, big)
-                    .map(|w| f32::from_le_bytes(w))
-                    .collect(),
-            ),
-            (npyz::TypeChar::Float, _) => Cells::F64(
-                words::<8>(rest, big)
-                    .map(|w| f64::from_le_bytes(w))
-                    .collect(),
-            ),
-            _ => Cells::I64(
-                words::<8>(rest, big)
-                    .map(|w| i64::from_le_bytes(w))
-                    .collect(),
-            ),
+            (npyz::TypeChar::Float, 4) => {
+                Cells::F32(words::<4>(rest, big).map(f32::from_le_bytes).collect())
+            }
+            (npyz::TypeChar::Float, _) => {
+                Cells::F64(words::<8>(rest, big).map(f64::from_le_bytes).collect())
+            }
+            _ => Cells::I64(words::<8>(rest, big).map(i64::from_le_bytes).collect()),
         };
         Ok(Table { columns, cells })
     }
