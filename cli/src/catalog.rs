@@ -476,7 +476,7 @@ impl Catalog {
             })
             .collect();
         let composed = self.composer()?.compose(&sp, &features, &sizes)?;
-        let mut composed = crate::runtime::program(&composed)?;
+        let mut composed = veduta::compose::program(&composed)?;
         // Features that make no difference are asked for as well.
         composed.program = program.to_owned().into();
         composed.features = features.into_iter().map(Into::into).collect();

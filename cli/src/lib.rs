@@ -8,7 +8,6 @@ pub mod cpu;
 pub mod error;
 pub mod image;
 pub mod render;
-pub mod runtime;
 pub mod shipped;
 pub mod table;
 

@@ -1,20 +1,175 @@
-//! Turns what the composer gives at run time into the tables that a build embeds.
+//! Composition at run time: variants that the build has not made, and shaders that change while the host runs.
 
-use veduta::program::{
-    Binding, ComposedProgram, EntryPoint, Member, Override, ScalarType, StageKind, StageSource,
-    StructLayout,
-};
-use veduta::wgpu;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
 use veduta_compose::compose::Composed;
-use veduta_compose::reflect;
+use veduta_compose::keys::Keys;
+use veduta_compose::library::Library;
+use veduta_compose::{Composer, reflect};
 
-use crate::error::CliError;
+use crate::error::Error;
+use crate::program::{
+    Binding, ComposedProgram, EntryPoint, Member, Override, ProgramSet, ScalarType, StageKind,
+    StageSource, StructLayout,
+};
 
-/// The tables of a composed program.
+/// The texts that programs are composed from: modules, programs and key declarations below some folders.
+///
+/// A folder's `.wgsl` files with a `#define_import_path` are modules, its `.sp` files are programs, and its `keys.ron`
+/// declares flags, sizes and values.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Source {
+    texts: BTreeMap<PathBuf, String>,
+}
+
+impl Source {
+    /// Reads every `.wgsl`, `.sp` and `keys.ron` file below the folders.
+    ///
+    /// # Errors
+    /// [`Error::Compose`] that names the folder or file that cannot be read, or that is not UTF-8.
+    pub fn read(folders: &[&Path]) -> Result<Source, Error> {
+        let mut source = Source::default();
+        for folder in folders {
+            source.add(folder)?;
+        }
+        Ok(source)
+    }
+
+    fn add(&mut self, folder: &Path) -> Result<(), Error> {
+        let fault = |path: &Path, e: std::io::Error| {
+            Error::Compose(format!("{}: cannot be read: {e}", path.display()))
+        };
+        for entry in std::fs::read_dir(folder).map_err(|e| fault(folder, e))? {
+            let path = entry.map_err(|e| fault(folder, e))?.path();
+            if path.is_dir() {
+                self.add(&path)?;
+                continue;
+            }
+            let ending = path.extension().and_then(|e| e.to_str());
+            if matches!(ending, Some("wgsl" | "sp")) || path.ends_with("keys.ron") {
+                let text = std::fs::read_to_string(&path).map_err(|e| fault(&path, e))?;
+                self.texts.insert(path, text);
+            }
+        }
+        Ok(())
+    }
+
+    fn with_ending(&self, ending: &str) -> Vec<(String, String)> {
+        self.texts
+            .iter()
+            .filter(|(path, _)| path.extension().is_some_and(|e| e == ending))
+            .map(|(path, text)| (path.display().to_string().replace('\\', "/"), text.clone()))
+            .collect()
+    }
+
+    /// Composes one variant of a program; flags that the program never mentions may be among the features.
+    ///
+    /// # Errors
+    /// [`Error::UnknownProgram`], and [`Error::Compose`] with every fault of the texts and its place.
+    pub fn compose(&self, program: &str, features: &[&str]) -> Result<ComposedProgram, Error> {
+        let faults = |e: veduta_compose::Diags| Error::Compose(e.to_string());
+        let programs = self.with_ending("sp");
+        let stem = |file: &str| {
+            Path::new(file)
+                .file_stem()
+                .map(|s| s.to_string_lossy().into_owned())
+                .unwrap_or_default()
+        };
+        let Some((file, text)) = programs.iter().find(|(file, _)| stem(file) == program) else {
+            return Err(Error::UnknownProgram {
+                name: program.to_owned(),
+                known: programs.iter().map(|(file, _)| stem(file)).collect(),
+            });
+        };
+        let keys = Keys::load(&self.with_ending("ron")).map_err(faults)?;
+        let library = Library::from_sources(self.with_ending("wgsl")).map_err(faults)?;
+        let sp = veduta_compose::sp::parse(file, text).map_err(faults)?;
+        let features: BTreeSet<String> = features.iter().map(|f| (*f).to_owned()).collect();
+        let composed = Composer::new(&library, keys)
+            .compose(&sp, &features, &BTreeMap::new())
+            .map_err(faults)?;
+        let mut composed = self::program(&composed)?;
+        // Features that make no difference are asked for as well.
+        composed.features = features.into_iter().map(Into::into).collect();
+        Ok(composed)
+    }
+}
+
+impl ProgramSet {
+    /// [`ProgramSet::get`], or the variant composed from `source` when the build has not made it; the set keeps it.
+    ///
+    /// # Errors
+    /// As [`Source::compose`].
+    pub fn get_or_compose(
+        &mut self,
+        source: &Source,
+        program: &str,
+        features: &[&str],
+    ) -> Result<&ComposedProgram, Error> {
+        if self.get(program, features).is_err() {
+            let composed = source.compose(program, features)?;
+            self.programs.to_mut().push(composed);
+        }
+        self.get(program, features)
+    }
+}
+
+/// Composes a program anew when one of its files has changed.
+#[derive(Debug, Clone)]
+pub struct Reloader {
+    folders: Vec<PathBuf>,
+    program: String,
+    features: Vec<String>,
+    source: Source,
+    current: ComposedProgram,
+}
+
+impl Reloader {
+    /// Reads the folders and composes the program for the first time.
+    ///
+    /// # Errors
+    /// As [`Source::read`] and [`Source::compose`].
+    pub fn new(folders: &[&Path], program: &str, features: &[&str]) -> Result<Reloader, Error> {
+        let source = Source::read(folders)?;
+        Ok(Reloader {
+            folders: folders.iter().map(|f| f.to_path_buf()).collect(),
+            program: program.to_owned(),
+            features: features.iter().map(|f| (*f).to_owned()).collect(),
+            current: source.compose(program, features)?,
+            source,
+        })
+    }
+
+    /// The program as it was composed last without a fault.
+    pub fn current(&self) -> &ComposedProgram {
+        &self.current
+    }
+
+    /// Reads the files again; `true` when their text has changed and the program was composed anew.
+    ///
+    /// Call it between frames, as often as edits shall show.
+    ///
+    /// # Errors
+    /// As [`Source::read`] and [`Source::compose`]; the program of before then stays, and the next call tries again.
+    pub fn poll(&mut self) -> Result<bool, Error> {
+        let folders: Vec<&Path> = self.folders.iter().map(PathBuf::as_path).collect();
+        let source = Source::read(&folders)?;
+        if source == self.source {
+            return Ok(false);
+        }
+        let features: Vec<&str> = self.features.iter().map(String::as_str).collect();
+        self.current = source.compose(&self.program, &features)?;
+        self.source = source;
+        Ok(true)
+    }
+}
+
+/// The tables of a composed program, as a build embeds them.
 ///
 /// # Errors
-/// [`CliError::Veduta`] for a storage format that `wgpu` does not have.
-pub fn program(composed: &Composed) -> Result<ComposedProgram, CliError> {
+/// [`Error::MissingFeature`] for a storage format that `wgpu` does not have.
+pub fn program(composed: &Composed) -> Result<ComposedProgram, Error> {
     Ok(ComposedProgram {
         program: composed.program.clone().into(),
         features: composed.features.iter().cloned().map(Into::into).collect(),
@@ -46,7 +201,7 @@ pub fn program(composed: &Composed) -> Result<ComposedProgram, CliError> {
                     visibility: stages(binding.visibility),
                 })
             })
-            .collect::<Result<_, CliError>>()?,
+            .collect::<Result<_, Error>>()?,
         overrides: composed
             .overrides
             .iter()
@@ -121,7 +276,7 @@ fn buffer(ty: wgpu::BufferBindingType, min_size: u64) -> wgpu::BindingType {
     }
 }
 
-fn binding_type(ty: reflect::BindingType) -> Result<wgpu::BindingType, CliError> {
+fn binding_type(ty: reflect::BindingType) -> Result<wgpu::BindingType, Error> {
     use reflect::BindingType as B;
     Ok(match ty {
         B::Uniform { min_size } => buffer(wgpu::BufferBindingType::Uniform, min_size),
@@ -167,7 +322,7 @@ fn binding_type(ty: reflect::BindingType) -> Result<wgpu::BindingType, CliError>
     })
 }
 
-fn storage_format(name: &str) -> Result<wgpu::TextureFormat, CliError> {
+fn storage_format(name: &str) -> Result<wgpu::TextureFormat, Error> {
     use wgpu::TextureFormat as F;
     const FORMATS: [F; 40] = [
         F::R8Unorm,
@@ -215,10 +370,9 @@ fn storage_format(name: &str) -> Result<wgpu::TextureFormat, CliError> {
         .into_iter()
         .find(|f| format!("{f:?}") == name)
         .ok_or_else(|| {
-            veduta::Error::MissingFeature {
+            Error::MissingFeature {
                 name: format!("storage format {name}"),
                 why: "the program uses".to_owned(),
             }
-            .into()
         })
 }

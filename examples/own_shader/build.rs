@@ -1,0 +1,3 @@
+fn main() {
+    veduta_compose::Build::new().programs("shaders").write();
+}
