@@ -8,7 +8,6 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use naga::proc::TypeResolution;
 use veduta_compose::library::Library;
 use veduta_compose::link::{LinkInput, Linker};
 
@@ -121,7 +120,7 @@ fn evaluate(@builtin(global_invocation_id) id: vec3<u32>) {{
         in.u[k] = bits;
         in.f[k] = bitcast<f32>(bits);
     }}
-    let value = {};
+    var value = {};
     let base = row * {width}u;
     {store}
 }}
@@ -132,29 +131,17 @@ fn evaluate(@builtin(global_invocation_id) id: vec3<u32>) {{
 }
 
 fn result_type(module: &naga::Module) -> Result<(usize, ResultKind), Error> {
-    let info = naga::valid::Validator::new(
-        naga::valid::ValidationFlags::all(),
-        naga::valid::Capabilities::empty(),
-    )
-    .validate(module)
-    .map_err(|e| Error::Compose(e.into_inner().to_string()))?;
-    let index = module
+    let value = module
         .entry_points
         .iter()
-        .position(|e| e.name == "evaluate")
-        .ok_or_else(|| Error::Compose("the entry point is missing".to_owned()))?;
-    let function = &module.entry_points[index].function;
-    let handle = function
-        .named_expressions
-        .iter()
-        .find(|(_, name)| *name == "value")
-        .map(|(h, _)| *h)
-        .ok_or_else(|| Error::Compose("the expression has no value".to_owned()))?;
-    let resolution = &info.get_entry_point(index)[handle].ty;
-    let inner = match resolution {
-        TypeResolution::Handle(h) => &module.types[*h].inner,
-        TypeResolution::Value(inner) => inner,
-    };
+        .find(|e| e.name == "evaluate")
+        .and_then(|e| {
+            let mut locals = e.function.local_variables.iter();
+            locals.find(|(_, local)| local.name.as_deref() == Some("value"))
+        })
+        .ok_or_else(|| Error::Compose("the expression has no value".to_owned()))?
+        .1;
+    let inner = &module.types[value.ty].inner;
     let (width, scalar) = match *inner {
         naga::TypeInner::Scalar(s) => (1, s),
         naga::TypeInner::Vector { size, scalar } => (size as usize, scalar),

@@ -5,6 +5,8 @@
 //!
 //! The WGSL is composed while this crate is built; [`programs()`] holds the variants of every shipped scene and preset.
 
+#[cfg(feature = "compose")]
+pub mod compose;
 pub mod device;
 pub mod error;
 #[cfg(feature = "compose")]

@@ -2,7 +2,9 @@
 
 use super::math::{Integral, dot, gauss_legendre, integrate_adaptive, length};
 use super::phase::{phase_cornette_shanks, phase_rayleigh};
-use super::planet::{altitude_along, direction_cosine_along, ground_distance, sphere_span, top_distance};
+use super::planet::{
+    altitude_along, direction_cosine_along, ground_distance, sphere_span, top_distance,
+};
 use std::f64::consts::PI;
 
 /// The planet's air; metres and 1/m.
@@ -54,7 +56,10 @@ pub struct SkyLight {
 /// Densities of air and aerosol, relative to sea level.
 pub fn air_density(atmosphere: &Atmosphere, h: f64) -> [f64; 2] {
     let h = h.max(0.0);
-    [(-h / atmosphere.rayleigh_height).exp(), (-h / atmosphere.mie_height).exp()]
+    [
+        (-h / atmosphere.rayleigh_height).exp(),
+        (-h / atmosphere.mie_height).exp(),
+    ]
 }
 
 /// Density integrals to the top of the shell [m] by the midpoint rule with `steps` points.
@@ -63,7 +68,10 @@ pub fn air_column(atmosphere: &Atmosphere, h: f64, mu: f64, steps: i32) -> [f64;
     let dt = top_distance(atmosphere.ground_radius, atmosphere.top, h, mu) / f64::from(count);
     let mut sum = [0.0; 2];
     for i in 0..count {
-        let density = air_density(atmosphere, altitude_along(atmosphere.ground_radius, h, mu, (f64::from(i) + 0.5) * dt));
+        let density = air_density(
+            atmosphere,
+            altitude_along(atmosphere.ground_radius, h, mu, (f64::from(i) + 0.5) * dt),
+        );
         sum[0] += density[0] * dt;
         sum[1] += density[1] * dt;
     }
@@ -72,7 +80,9 @@ pub fn air_column(atmosphere: &Atmosphere, h: f64, mu: f64, steps: i32) -> [f64;
 
 /// Transmittance of a pair of columns, per channel.
 fn column_transmittance(atmosphere: &Atmosphere, column: [f64; 2]) -> [f64; 3] {
-    atmosphere.rayleigh_scattering.map(|rayleigh| (-(rayleigh * column[0] + atmosphere.mie_extinction * column[1])).exp())
+    atmosphere
+        .rayleigh_scattering
+        .map(|rayleigh| (-(rayleigh * column[0] + atmosphere.mie_extinction * column[1])).exp())
 }
 
 /// Share of sunlight that reaches an altitude, by the midpoint rule; 0 in the planet's shadow.
@@ -118,14 +128,23 @@ pub fn march_sky(
         let density = air_density(atmosphere, h);
         let mu = direction_cosine_along(radius, eye_altitude, h, to_sun[1], nu, t);
         let sun = sun_transmittance(atmosphere, h, mu, light_steps);
-        let view = column_transmittance(atmosphere, [column[0] + 0.5 * density[0] * dt, column[1] + 0.5 * density[1] * dt]);
+        let view = column_transmittance(
+            atmosphere,
+            [
+                column[0] + 0.5 * density[0] * dt,
+                column[1] + 0.5 * density[1] * dt,
+            ],
+        );
         for k in 0..3 {
             rayleigh[k] += sun[k] * view[k] * density[0] * dt;
             mie[k] += sun[k] * view[k] * density[1] * dt;
         }
         column = [column[0] + density[0] * dt, column[1] + density[1] * dt];
     }
-    SkyLight { in_scatter: radiance(atmosphere, nu, rayleigh, mie), transmittance: column_transmittance(atmosphere, column) }
+    SkyLight {
+        in_scatter: radiance(atmosphere, nu, rayleigh, mie),
+        transmittance: column_transmittance(atmosphere, column),
+    }
 }
 
 /// Radiance of the two integrals.
@@ -149,7 +168,10 @@ pub fn air_column_exact(atmosphere: &Atmosphere, h: f64, mu: f64, distance: f64)
             let (a, b) = (edge(i), edge(i + 1));
             for &(x, w) in &rule {
                 let t = 0.5 * (a + b) + 0.5 * (b - a) * x;
-                let density = air_density(atmosphere, altitude_along(atmosphere.ground_radius, h, mu, t));
+                let density = air_density(
+                    atmosphere,
+                    altitude_along(atmosphere.ground_radius, h, mu, t),
+                );
                 sum[0] += 0.5 * w * (b - a).abs() * density[0];
                 sum[1] += 0.5 * w * (b - a).abs() * density[1];
             }
@@ -160,13 +182,24 @@ pub fn air_column_exact(atmosphere: &Atmosphere, h: f64, mu: f64, distance: f64)
 
 /// Sky light by adaptive quadrature to the absolute `tolerance` of the two integrals [m], split at the planet's shadow;
 /// the error estimate is that of the larger integral [m].
-pub fn sky_adaptive(atmosphere: &Atmosphere, eye_altitude: f64, dir: [f64; 3], to_sun: [f64; 3], distance: f64, tolerance: f64) -> (SkyLight, f64) {
+pub fn sky_adaptive(
+    atmosphere: &Atmosphere,
+    eye_altitude: f64,
+    dir: [f64; 3],
+    to_sun: [f64; 3],
+    distance: f64,
+    tolerance: f64,
+) -> (SkyLight, f64) {
     let radius = atmosphere.ground_radius;
     let nu = dot(dir, to_sun);
     let (near, end) = view_span(atmosphere, eye_altitude, dir[1], distance);
     let lit = |t: f64| {
         let h = altitude_along(radius, eye_altitude, dir[1], t).max(0.0);
-        ground_distance(radius, h, direction_cosine_along(radius, eye_altitude, h, to_sun[1], nu, t)) < 0.0
+        ground_distance(
+            radius,
+            h,
+            direction_cosine_along(radius, eye_altitude, h, to_sun[1], nu, t),
+        ) < 0.0
     };
     let integrand = |t: f64| -> [f64; 6] {
         let h = altitude_along(radius, eye_altitude, dir[1], t).max(0.0);
@@ -174,10 +207,18 @@ pub fn sky_adaptive(atmosphere: &Atmosphere, eye_altitude: f64, dir: [f64; 3], t
         if ground_distance(radius, h, mu) >= 0.0 {
             return [0.0; 6];
         }
-        let sun = air_column_exact(atmosphere, h, mu, top_distance(radius, atmosphere.top, h, mu));
+        let sun = air_column_exact(
+            atmosphere,
+            h,
+            mu,
+            top_distance(radius, atmosphere.top, h, mu),
+        );
         let start = air_column_exact(atmosphere, eye_altitude, dir[1], near);
         let view = air_column_exact(atmosphere, eye_altitude, dir[1], t);
-        let light = column_transmittance(atmosphere, std::array::from_fn(|k| sun[k] + view[k] - start[k]));
+        let light = column_transmittance(
+            atmosphere,
+            std::array::from_fn(|k| sun[k] + view[k] - start[k]),
+        );
         let density = air_density(atmosphere, h);
         std::array::from_fn(|k| light[k % 3] * density[k / 3])
     };
@@ -189,13 +230,20 @@ pub fn sky_adaptive(atmosphere: &Atmosphere, eye_altitude: f64, dir: [f64; 3], t
         if lit(a) != lit(b) {
             for _ in 0..60 {
                 let middle = 0.5 * (a + b);
-                if lit(middle) == lit(a) { a = middle } else { b = middle }
+                if lit(middle) == lit(a) {
+                    a = middle
+                } else {
+                    b = middle
+                }
             }
             borders.push(0.5 * (a + b));
         }
     }
     borders.push(end);
-    let mut total = Integral { value: [0.0; 6], error: 0.0 };
+    let mut total = Integral {
+        value: [0.0; 6],
+        error: 0.0,
+    };
     for pair in borders.windows(2) {
         let part = integrate_adaptive(&integrand, pair[0], pair[1], tolerance);
         total.error += part.error;
@@ -223,7 +271,10 @@ pub fn sun_disc(dir: [f64; 3], to_sun: [f64; 3], angular_radius: f64, pixel_angl
     ];
     let coverage = |angle: f64| (0.5 + (angular_radius - angle) / ramp).clamp(0.0, 1.0);
     // Area of the ramped disc, by quadrature on both of its pieces.
-    let (inner, outer) = ((angular_radius - 0.5 * ramp).max(0.0), angular_radius + 0.5 * ramp);
+    let (inner, outer) = (
+        (angular_radius - 0.5 * ramp).max(0.0),
+        angular_radius + 0.5 * ramp,
+    );
     let mut area = PI * inner * inner;
     for (x, w) in gauss_legendre(4) {
         let angle = 0.5 * (inner + outer) + 0.5 * (outer - inner) * x;

@@ -4,8 +4,8 @@ use super::fractal::fbm_value_3d_periodic;
 use super::math::{add, dot, scale};
 use super::phase::phase_double_henyey_greenstein;
 use super::planet::{
-    altitude_along, altitude_of, clip_segment, direction_cosine_along, ground_distance, segment_distance, segment_length, shell_segment,
-    sphere_span, top_distance,
+    altitude_along, altitude_of, clip_segment, direction_cosine_along, ground_distance,
+    segment_distance, segment_length, shell_segment, sphere_span, top_distance,
 };
 
 /// A layer of clouds between two spheres around the planet; metres and 1/m.
@@ -67,9 +67,23 @@ pub fn cloud_density(layer: &CloudLayer, relative: [f64; 3], altitude: f64) -> f
     if altitude < layer.bottom || altitude > layer.bottom + layer.thickness {
         return 0.0;
     }
-    let place = add(layer.frac, scale([relative[0], altitude, relative[2]], 1.0 / layer.wavelength));
-    let period = if layer.period > 0 { layer.period } else { 1 << 20 };
-    let n = fbm_value_3d_periodic(layer.cell, place, [period; 3], layer.octaves, layer.hurst, layer.seed);
+    let place = add(
+        layer.frac,
+        scale([relative[0], altitude, relative[2]], 1.0 / layer.wavelength),
+    );
+    let period = if layer.period > 0 {
+        layer.period
+    } else {
+        1 << 20
+    };
+    let n = fbm_value_3d_periodic(
+        layer.cell,
+        place,
+        [period; 3],
+        layer.octaves,
+        layer.hurst,
+        layer.seed,
+    );
     shape_coverage(n, layer.coverage, layer.uniformity)
 }
 
@@ -84,12 +98,24 @@ pub fn layer_exit(layer: &CloudLayer, ground_radius: f64, altitude: f64, mu: f64
 }
 
 /// Optical depth from a point within the layer towards the sun, by the midpoint rule.
-pub fn sun_depth(layer: &CloudLayer, ground_radius: f64, relative: [f64; 3], altitude: f64, to_sun: [f64; 3], mu: f64, steps: i32) -> f64 {
+pub fn sun_depth(
+    layer: &CloudLayer,
+    ground_radius: f64,
+    relative: [f64; 3],
+    altitude: f64,
+    to_sun: [f64; 3],
+    mu: f64,
+    steps: i32,
+) -> f64 {
     let count = steps.max(1);
     let ds = layer_exit(layer, ground_radius, altitude, mu) / f64::from(count);
     let density = |i: i32| {
         let s = (f64::from(i) + 0.5) * ds;
-        cloud_density(layer, add(relative, scale(to_sun, s)), altitude_along(ground_radius, altitude, mu, s))
+        cloud_density(
+            layer,
+            add(relative, scale(to_sun, s)),
+            altitude_along(ground_radius, altitude, mu, s),
+        )
     };
     (0..count).map(density).sum::<f64>() * ds * layer.extinction
 }
@@ -109,7 +135,10 @@ pub fn march_clouds(
 ) -> CloudLight {
     let count = steps.max(1);
     let top = layer.bottom + layer.thickness;
-    let segment = clip_segment(shell_segment(ground_radius, layer.bottom, top, eye_altitude, dir[1]), max_distance);
+    let segment = clip_segment(
+        shell_segment(ground_radius, layer.bottom, top, eye_altitude, dir[1]),
+        max_distance,
+    );
     let ds = segment_length(segment) / f64::from(count);
     let nu = dot(dir, to_sun);
     let (mut depth, mut scatter, mut weight, mut weighted) = (0.0f64, 0.0, 0.0, 0.0);
@@ -119,9 +148,18 @@ pub fn march_clouds(
         let altitude = altitude_of(ground_radius, eye_altitude, relative);
         let step_depth = cloud_density(layer, relative, altitude) * layer.extinction * ds;
         if step_depth > 0.0 {
-            let mu = direction_cosine_along(ground_radius, eye_altitude, altitude, to_sun[1], nu, t);
+            let mu =
+                direction_cosine_along(ground_radius, eye_altitude, altitude, to_sun[1], nu, t);
             if ground_distance(ground_radius, altitude, mu) < 0.0 {
-                let sun = sun_depth(layer, ground_radius, relative, altitude, to_sun, mu, light_steps);
+                let sun = sun_depth(
+                    layer,
+                    ground_radius,
+                    relative,
+                    altitude,
+                    to_sun,
+                    mu,
+                    light_steps,
+                );
                 scatter += (-depth - sun).exp() * step_depth;
             }
             let seen = (-depth).exp() - (-depth - step_depth).exp();
@@ -130,11 +168,16 @@ pub fn march_clouds(
             depth += step_depth;
         }
     }
-    let phase = phase_double_henyey_greenstein(nu, layer.g_forward, layer.g_backward, layer.backward_share);
+    let phase =
+        phase_double_henyey_greenstein(nu, layer.g_forward, layer.g_backward, layer.backward_share);
     CloudLight {
         scatter: scatter * layer.albedo * phase,
         transmittance: (-depth).exp(),
-        mean_distance: if weight > 1e-12 { weighted / weight } else { segment.near },
+        mean_distance: if weight > 1e-12 {
+            weighted / weight
+        } else {
+            segment.near
+        },
     }
 }
 
@@ -142,7 +185,10 @@ pub fn march_clouds(
 /// irradiance of 1 and scatters once: zenith cosines `view_mu` and `sun_mu` > 0, phase function value `phase` [1/sr].
 pub fn slab_single_scatter(depth: f64, albedo: f64, phase: f64, view_mu: f64, sun_mu: f64) -> f64 {
     let slope = 1.0 / view_mu - 1.0 / sun_mu;
-    albedo * phase / view_mu * depth * (-depth / sun_mu).exp() * super::math::one_minus_exp_over_x(slope * depth)
+    albedo * phase / view_mu
+        * depth
+        * (-depth / sun_mu).exp()
+        * super::math::one_minus_exp_over_x(slope * depth)
 }
 
 /// Radiance with clouds: the air before them (`front`), their own light, and what they let through.
@@ -154,6 +200,7 @@ pub fn composite_clouds(
 ) -> [f64; 3] {
     std::array::from_fn(|k| {
         let air = front.in_scatter[k];
-        air + front.transmittance[k] * clouds.scatter * sun_light[k] + clouds.transmittance * (background[k] - air).max(0.0)
+        air + front.transmittance[k] * clouds.scatter * sun_light[k]
+            + clouds.transmittance * (background[k] - air).max(0.0)
     })
 }

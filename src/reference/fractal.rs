@@ -26,7 +26,7 @@ pub fn slope_sum(octaves: i32, hurst: f64) -> f64 {
 
 /// Gradient noise of octave i with its gradient per cell of octave 0.
 pub fn octave_noise_2d(cell: [i32; 2], frac: [f64; 2], i: i32, seed: u32) -> [f64; 3] {
-    let Lattice2d { cell, frac } = octave_2d(cell, frac, i, seed);
+    let Lattice2d { cell, frac } = octave_2d(cell, frac, i);
     let [n, dx, dy] = gradient_noise_2d_slope(cell, frac, octave_seed(seed, i));
     let f = octave_frequency(i);
     [n, f * dx, f * dy]
@@ -66,7 +66,7 @@ pub fn fbm_3d_slope(
     for i in 0..octaves {
         let a = octave_amplitude(i, hurst);
         let f = octave_frequency(i);
-        let Lattice3d { cell, frac } = octave_3d(cell, frac, i, seed);
+        let Lattice3d { cell, frac } = octave_3d(cell, frac, i);
         let [n, dx, dy, dz] = gradient_noise_3d_slope(cell, frac, octave_seed(seed, i));
         let term = [n, f * dx, f * dy, f * dz];
         sum = std::array::from_fn(|k| sum[k] + a * term[k]);
@@ -86,7 +86,7 @@ pub fn fbm_value_3d(cell: [i32; 3], frac: [f64; 3], octaves: i32, hurst: f64, se
     }
     let sum: f64 = (0..octaves)
         .map(|i| {
-            let p = octave_3d(cell, frac, i, seed);
+            let p = octave_3d(cell, frac, i);
             octave_amplitude(i, hurst) * value_noise_3d(p.cell, p.frac, octave_seed(seed, i))
         })
         .sum();
@@ -111,7 +111,7 @@ pub fn fbm_value_3d_periodic(
     let home = wrap_3d(base.cell, period);
     let sum: f64 = (0..octaves)
         .map(|i| {
-            let p = octave_3d(home, base.frac, i, seed);
+            let p = octave_3d(home, base.frac, i);
             let size = period.map(|length| length << i);
             let n = value_noise_3d_periodic(p.cell, p.frac, size, octave_seed(seed, i));
             octave_amplitude(i, hurst) * n
@@ -175,13 +175,7 @@ pub fn smooth_abs(n: f64, smoothness: f64) -> f64 {
 }
 
 /// 1 - |n| of octave i, smoothed, with its gradient.
-fn ridge(
-    cell: [i32; 2],
-    frac: [f64; 2],
-    i: i32,
-    smoothness: f64,
-    seed: u32,
-) -> [f64; 3] {
+fn ridge(cell: [i32; 2], frac: [f64; 2], i: i32, smoothness: f64, seed: u32) -> [f64; 3] {
     let [n, dx, dy] = octave_noise_2d(cell, frac, i, seed);
     let size = smooth_abs(n, smoothness);
     let change = if size > 0.0 { n / size } else { 0.0 };

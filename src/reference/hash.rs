@@ -14,7 +14,14 @@ fn generate<const N: usize>(v: [u32; N]) -> [u32; N] {
 
 /// What one word contributes to another in a round: xor-shift, then multiply.
 fn stir(word: u32) -> u32 {
-    (word ^ (word >> 18)).wrapping_mul(747_796_405)
+    (word ^ (word >> 16)).wrapping_mul(747_796_405)
+}
+
+/// The last steps of a first word: an odd multiplier between two xor-shifts.
+fn finish(word: u32, factor: u32) -> u32 {
+    let shifted = word ^ (word >> 15);
+    let product = shifted.wrapping_mul(factor | 1);
+    product ^ (product >> 15)
 }
 
 /// The key spread over the word.
@@ -25,11 +32,10 @@ fn spread(key: u32) -> u32 {
 /// Mixing hash of two words with a key; a bijection of the vector for every key.
 pub fn pcg_2d_keyed(v: [u32; 2], key: u32) -> [u32; 2] {
     let [x0, y0] = generate(v);
-    let x1 = x0.wrapping_add(stir(y0) ^ spread(key));
+    let row = stir(y0) ^ spread(key);
+    let x1 = finish(x0.wrapping_add(row), row);
     let y1 = y0.wrapping_add(stir(x1));
-    let x2 = x1.wrapping_add(stir(y1));
-    let y2 = y1.wrapping_add(stir(x2));
-    [x2, y2]
+    [x1, y1]
 }
 
 /// Mixing hash of two words; a bijection of the vector.
@@ -41,12 +47,11 @@ pub fn pcg_2d(v: [u32; 2]) -> [u32; 2] {
 pub fn pcg_3d_keyed(v: [u32; 3], key: u32) -> [u32; 3] {
     let [x0, y0, z0] = generate(v);
     let y1 = y0.wrapping_add(stir(z0));
-    let x1 = x0.wrapping_add(stir(y1) ^ spread(key));
-    let y2 = y1.wrapping_add(stir(x1));
-    let x2 = x1.wrapping_add(stir(y2 ^ z0));
-    let z1 = z0.wrapping_add(stir(x2 ^ y2));
-    let y3 = y2.wrapping_add(stir(z1));
-    [x2, y3, z1]
+    let row = stir(y1).wrapping_add(z0) ^ spread(key);
+    let x1 = finish(x0.wrapping_add(row), y1);
+    let z1 = z0.wrapping_add(stir(x1 ^ y1));
+    let y2 = y1.wrapping_add(stir(z1));
+    [x1, y2, z1]
 }
 
 /// Mixing hash of three words; a bijection of the vector.

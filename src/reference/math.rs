@@ -82,7 +82,12 @@ pub struct Integral<const N: usize> {
 
 /// Integral of `f` over [a, b] by adaptive halving of an 8-point Gauss-Legendre rule, to the absolute `tolerance`
 /// or 24 halvings, whichever is first.
-pub fn integrate_adaptive<const N: usize>(f: &dyn Fn(f64) -> [f64; N], a: f64, b: f64, tolerance: f64) -> Integral<N> {
+pub fn integrate_adaptive<const N: usize>(
+    f: &dyn Fn(f64) -> [f64; N],
+    a: f64,
+    b: f64,
+    tolerance: f64,
+) -> Integral<N> {
     let rule = gauss_legendre(8);
     let apply = |a: f64, b: f64| {
         let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
@@ -95,7 +100,10 @@ pub fn integrate_adaptive<const N: usize>(f: &dyn Fn(f64) -> [f64; N], a: f64, b
         }
         sum
     };
-    let mut result = Integral { value: [0.0; N], error: 0.0 };
+    let mut result = Integral {
+        value: [0.0; N],
+        error: 0.0,
+    };
     if b <= a {
         return result;
     }
@@ -103,7 +111,9 @@ pub fn integrate_adaptive<const N: usize>(f: &dyn Fn(f64) -> [f64; N], a: f64, b
     while let Some((a, b, whole, tolerance, depth)) = open.pop() {
         let middle = 0.5 * (a + b);
         let (left, right) = (apply(a, middle), apply(middle, b));
-        let error = (0..N).map(|k| (left[k] + right[k] - whole[k]).abs()).fold(0.0, f64::max);
+        let error = (0..N)
+            .map(|k| (left[k] + right[k] - whole[k]).abs())
+            .fold(0.0, f64::max);
         if error <= tolerance || depth >= 24 {
             for k in 0..N {
                 result.value[k] += left[k] + right[k];

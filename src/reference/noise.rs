@@ -65,38 +65,21 @@ pub fn octave_seed(seed: u32, i: i32) -> u32 {
     seed.wrapping_add(i.cast_unsigned().wrapping_mul(0x9e37_79b9))
 }
 
-/// The shift of octave i: odd 64ths after the multiples of `steps / 2^32`; none for octave 0.
-fn octave_shift<const N: usize>(i: i32, seed: u32, steps: [u32; N]) -> [f64; N] {
-    let start = seed.wrapping_mul(2_654_435_761);
-    steps.map(|step| {
-        let word = start.wrapping_add(step.wrapping_mul(i.cast_unsigned()));
-        if i == 0 {
-            0.0
-        } else {
-            f64::from(2 * (word >> 27) + 1) / 64.0
-        }
-    })
-}
+/// The shift of every octave in 2D.
+pub const SHIFT_2D: [f64; 2] = [11.0 / 64.0, 25.0 / 64.0];
 
-/// The shift of octave i's lattice in 2D.
-pub fn octave_shift_2d(i: i32, seed: u32) -> [f64; 2] {
-    octave_shift(i, seed, [3_242_174_889, 2_447_445_413])
-}
+/// The shift of every octave in 3D.
+pub const SHIFT_3D: [f64; 3] = [11.0 / 64.0, 13.0 / 64.0, 25.0 / 64.0];
 
-/// The shift of octave i's lattice in 3D.
-pub fn octave_shift_3d(i: i32, seed: u32) -> [f64; 3] {
-    octave_shift(i, seed, [3_518_319_155, 2_882_110_345, 2_360_945_575])
-}
-
-/// A position on the lattice of octave i: 2^i times as fine, shifted.
-pub fn octave_2d(cell: [i32; 2], frac: [f64; 2], i: i32, seed: u32) -> Lattice2d {
-    let (cell, frac) = place(cell, frac, i, octave_shift_2d(i, seed));
+/// A position on the lattice of octave i, 2^i p + d.
+pub fn octave_2d(cell: [i32; 2], frac: [f64; 2], i: i32) -> Lattice2d {
+    let (cell, frac) = place(cell, frac, i, SHIFT_2D);
     Lattice2d { cell, frac }
 }
 
-/// A position on the lattice of octave i in 3D.
-pub fn octave_3d(cell: [i32; 3], frac: [f64; 3], i: i32, seed: u32) -> Lattice3d {
-    let (cell, frac) = place(cell, frac, i, octave_shift_3d(i, seed));
+/// A position on the lattice of octave i in 3D, 2^i p + d.
+pub fn octave_3d(cell: [i32; 3], frac: [f64; 3], i: i32) -> Lattice3d {
+    let (cell, frac) = place(cell, frac, i, SHIFT_3D);
     Lattice3d { cell, frac }
 }
 
@@ -182,12 +165,7 @@ pub fn value_noise_3d(cell: [i32; 3], frac: [f64; 3], seed: u32) -> f64 {
 }
 
 /// Value noise in 3D whose lattice repeats after `period` cells.
-pub fn value_noise_3d_periodic(
-    cell: [i32; 3],
-    frac: [f64; 3],
-    period: [i32; 3],
-    seed: u32,
-) -> f64 {
+pub fn value_noise_3d_periodic(cell: [i32; 3], frac: [f64; 3], period: [i32; 3], seed: u32) -> f64 {
     let p = split_3d(cell, frac);
     let (value, _) = blend(p.frac, |offset| {
         let word = lattice_hash_3d(wrap_3d(neighbour(p.cell, offset), period), seed)[0];

@@ -18,8 +18,14 @@ pub fn phase_henyey_greenstein(mu: f64, g: f64) -> f64 {
 }
 
 /// A forward and a backward lobe of Henyey and Greenstein.
-pub fn phase_double_henyey_greenstein(mu: f64, g_forward: f64, g_backward: f64, backward_share: f64) -> f64 {
-    (1.0 - backward_share) * phase_henyey_greenstein(mu, g_forward) + backward_share * phase_henyey_greenstein(mu, g_backward)
+pub fn phase_double_henyey_greenstein(
+    mu: f64,
+    g_forward: f64,
+    g_backward: f64,
+    backward_share: f64,
+) -> f64 {
+    (1.0 - backward_share) * phase_henyey_greenstein(mu, g_forward)
+        + backward_share * phase_henyey_greenstein(mu, g_backward)
 }
 
 /// Schlick's fit to Henyey and Greenstein.
@@ -30,5 +36,6 @@ pub fn phase_schlick(mu: f64, g: f64) -> f64 {
 
 /// Cornette and Shanks.
 pub fn phase_cornette_shanks(mu: f64, g: f64) -> f64 {
-    3.0 / (8.0 * PI) * (1.0 - g * g) * (1.0 + mu * mu) / ((2.0 + g * g) * (1.0 + g * g - 2.0 * g * mu).powf(1.5))
+    3.0 / (8.0 * PI) * (1.0 - g * g) * (1.0 + mu * mu)
+        / ((2.0 + g * g) * (1.0 + g * g - 2.0 * g * mu).powf(1.5))
 }

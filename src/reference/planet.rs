@@ -27,22 +27,40 @@ pub struct ShellSegment {
 
 /// Altitude at distance `t` along a ray: the distance to the centre less the radius.
 pub fn altitude_along(ground_radius: f64, h: f64, mu: f64, t: f64) -> f64 {
-    let (up, aside) = (ground_radius + h + mu * t, (1.0 - mu * mu).max(0.0).sqrt() * t);
+    let (up, aside) = (
+        ground_radius + h + mu * t,
+        (1.0 - mu * mu).max(0.0).sqrt() * t,
+    );
     up.hypot(aside) - ground_radius
 }
 
 /// Altitude of a point given relative to the eye.
 pub fn altitude_of(ground_radius: f64, eye_altitude: f64, relative: [f64; 3]) -> f64 {
-    length([relative[0], relative[1] + ground_radius + eye_altitude, relative[2]]) - ground_radius
+    length([
+        relative[0],
+        relative[1] + ground_radius + eye_altitude,
+        relative[2],
+    ]) - ground_radius
 }
 
 /// Unit vector away from the planet's centre.
 pub fn up_at(ground_radius: f64, eye_altitude: f64, relative: [f64; 3]) -> [f64; 3] {
-    super::math::normalize([relative[0], relative[1] + ground_radius + eye_altitude, relative[2]])
+    super::math::normalize([
+        relative[0],
+        relative[1] + ground_radius + eye_altitude,
+        relative[2],
+    ])
 }
 
 /// Zenith cosine at distance `t` along a ray of a direction that has `direction_mu` at its start and the cosine `nu` with it.
-pub fn direction_cosine_along(ground_radius: f64, h: f64, altitude: f64, direction_mu: f64, nu: f64, t: f64) -> f64 {
+pub fn direction_cosine_along(
+    ground_radius: f64,
+    h: f64,
+    altitude: f64,
+    direction_mu: f64,
+    nu: f64,
+    t: f64,
+) -> f64 {
     (((ground_radius + h) * direction_mu + t * nu) / (ground_radius + altitude)).clamp(-1.0, 1.0)
 }
 
@@ -53,9 +71,15 @@ pub fn sphere_span(ground_radius: f64, level: f64, h: f64, mu: f64) -> Span {
     let radius = ground_radius + level;
     let half = (radius - closest) * (radius + closest);
     if half < 0.0 {
-        return Span { near: 1.0, far: -1.0 };
+        return Span {
+            near: 1.0,
+            far: -1.0,
+        };
     }
-    Span { near: -r * mu - half.sqrt(), far: -r * mu + half.sqrt() }
+    Span {
+        near: -r * mu - half.sqrt(),
+        far: -r * mu + half.sqrt(),
+    }
 }
 
 /// Distance to the top of the shell.
@@ -66,7 +90,11 @@ pub fn top_distance(ground_radius: f64, top: f64, h: f64, mu: f64) -> f64 {
 /// Distance to the ground sphere; -1 when the ray misses it.
 pub fn ground_distance(ground_radius: f64, h: f64, mu: f64) -> f64 {
     let span = sphere_span(ground_radius, 0.0, h, mu);
-    if mu < 0.0 && span.near <= span.far { span.near.max(0.0) } else { -1.0 }
+    if mu < 0.0 && span.near <= span.far {
+        span.near.max(0.0)
+    } else {
+        -1.0
+    }
 }
 
 /// The part of a ray between the spheres at `bottom` and `top`: the crossings of the three spheres in order, and of the
@@ -91,16 +119,36 @@ pub fn shell_segment(ground_radius: f64, bottom: f64, top: f64, h: f64, mu: f64)
         }
     }
     match stretches[..] {
-        [] => ShellSegment { near: 0.0, far: 0.0, gap_near: 0.0, gap_far: 0.0 },
-        [(near, far)] => ShellSegment { near, far, gap_near: far, gap_far: far },
-        [(near, gap_near), (gap_far, far), ..] => ShellSegment { near, far, gap_near, gap_far },
+        [] => ShellSegment {
+            near: 0.0,
+            far: 0.0,
+            gap_near: 0.0,
+            gap_far: 0.0,
+        },
+        [(near, far)] => ShellSegment {
+            near,
+            far,
+            gap_near: far,
+            gap_far: far,
+        },
+        [(near, gap_near), (gap_far, far), ..] => ShellSegment {
+            near,
+            far,
+            gap_near,
+            gap_far,
+        },
     }
 }
 
 /// A segment shortened to end at `max_distance`.
 pub fn clip_segment(segment: ShellSegment, max_distance: f64) -> ShellSegment {
     let clip = |t: f64| t.min(max_distance.max(0.0));
-    ShellSegment { near: clip(segment.near), far: clip(segment.far), gap_near: clip(segment.gap_near), gap_far: clip(segment.gap_far) }
+    ShellSegment {
+        near: clip(segment.near),
+        far: clip(segment.far),
+        gap_near: clip(segment.gap_near),
+        gap_far: clip(segment.gap_far),
+    }
 }
 
 /// Length of a segment without its gap.
@@ -111,7 +159,11 @@ pub fn segment_length(segment: ShellSegment) -> f64 {
 /// Distance along the ray at the length `s` into a segment.
 pub fn segment_distance(segment: ShellSegment, s: f64) -> f64 {
     let t = segment.near + s;
-    if t > segment.gap_near { t + segment.gap_far - segment.gap_near } else { t }
+    if t > segment.gap_near {
+        t + segment.gap_far - segment.gap_near
+    } else {
+        t
+    }
 }
 
 /// Altitude of the point `dir * t`, for callers that hold a direction.

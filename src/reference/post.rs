@@ -4,7 +4,11 @@
 pub fn encode_srgb(linear: [f64; 3]) -> [f64; 3] {
     linear.map(|c| {
         let c = c.max(0.0);
-        if c <= 0.0031308 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 }
+        if c <= 0.0031308 {
+            12.92 * c
+        } else {
+            1.055 * c.powf(1.0 / 2.4) - 0.055
+        }
     })
 }
 
@@ -12,7 +16,11 @@ pub fn encode_srgb(linear: [f64; 3]) -> [f64; 3] {
 pub fn decode_srgb(encoded: [f64; 3]) -> [f64; 3] {
     encoded.map(|c| {
         let c = c.max(0.0);
-        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+        if c <= 0.04045 {
+            c / 12.92
+        } else {
+            ((c + 0.055) / 1.055).powf(2.4)
+        }
     })
 }
 

@@ -40,33 +40,84 @@ pub struct TerrainHit {
 
 /// Height of the ground.
 pub fn height(terrain: &Terrain, offset: [f64; 2], octaves: i32) -> f64 {
-    let place = [terrain.frac[0] + offset[0] / terrain.wavelength, terrain.frac[1] + offset[1] / terrain.wavelength];
+    let place = [
+        terrain.frac[0] + offset[0] / terrain.wavelength,
+        terrain.frac[1] + offset[1] / terrain.wavelength,
+    ];
     terrain.amplitude
-        * ridged_multifractal_2d(terrain.cell, place, octaves, terrain.hurst, terrain.gain, terrain.smoothness, terrain.seed)
+        * ridged_multifractal_2d(
+            terrain.cell,
+            place,
+            octaves,
+            terrain.hurst,
+            terrain.gain,
+            terrain.smoothness,
+            terrain.seed,
+        )
 }
 
 /// Clearance above any ground at distance `t` along a ray from the eye.
-pub fn clearance_over(ground: impl Fn([f64; 2]) -> f64, ground_radius: f64, eye_altitude: f64, dir: [f64; 3], t: f64) -> f64 {
+pub fn clearance_over(
+    ground: impl Fn([f64; 2]) -> f64,
+    ground_radius: f64,
+    eye_altitude: f64,
+    dir: [f64; 3],
+    t: f64,
+) -> f64 {
     altitude_of(ground_radius, eye_altitude, scale(dir, t)) - ground([dir[0] * t, dir[2] * t])
 }
 
 /// Clearance above the terrain at distance `t` along a ray from the eye.
-pub fn ray_clearance(terrain: &Terrain, ground_radius: f64, eye_altitude: f64, dir: [f64; 3], t: f64, octaves: i32) -> f64 {
-    clearance_over(|p| height(terrain, p, octaves), ground_radius, eye_altitude, dir, t)
+pub fn ray_clearance(
+    terrain: &Terrain,
+    ground_radius: f64,
+    eye_altitude: f64,
+    dir: [f64; 3],
+    t: f64,
+    octaves: i32,
+) -> f64 {
+    clearance_over(
+        |p| height(terrain, p, octaves),
+        ground_radius,
+        eye_altitude,
+        dir,
+        t,
+    )
 }
 
 /// First sample below a clearance function walked in equal steps.
-pub fn march_constant_over(clearance: impl Fn(f64) -> f64, near: f64, far: f64, step: f64, max_steps: i32, interpolate: bool) -> TerrainHit {
-    let mut hit = TerrainHit { distance: -1.0, reached: near, clearance: 0.0, steps: 0 };
+pub fn march_constant_over(
+    clearance: impl Fn(f64) -> f64,
+    near: f64,
+    far: f64,
+    step: f64,
+    max_steps: i32,
+    interpolate: bool,
+) -> TerrainHit {
+    let mut hit = TerrainHit {
+        distance: -1.0,
+        reached: near,
+        clearance: 0.0,
+        steps: 0,
+    };
     for i in 0..max_steps {
         let t = near + f64::from(i) * step;
         if t > far {
             break;
         }
         let (above, below) = (hit.clearance, clearance(t));
-        hit = TerrainHit { distance: -1.0, reached: t, clearance: below, steps: i + 1 };
+        hit = TerrainHit {
+            distance: -1.0,
+            reached: t,
+            clearance: below,
+            steps: i + 1,
+        };
         if below < 0.0 {
-            hit.distance = if interpolate && i > 0 { t - step + step * above / (above - below) } else { t };
+            hit.distance = if interpolate && i > 0 {
+                t - step + step * above / (above - below)
+            } else {
+                t
+            };
             break;
         }
     }
@@ -87,12 +138,31 @@ pub fn march_constant(
     octaves: i32,
     interpolate: bool,
 ) -> TerrainHit {
-    march_constant_over(|t| ray_clearance(terrain, ground_radius, eye_altitude, dir, t, octaves), near, far, step, max_steps, interpolate)
+    march_constant_over(
+        |t| ray_clearance(terrain, ground_radius, eye_altitude, dir, t, octaves),
+        near,
+        far,
+        step,
+        max_steps,
+        interpolate,
+    )
 }
 
 /// Algorithm 4, corrected, over a clearance function: accumulate the distance, tolerance epsilon * 0.001 * t.
-pub fn march_over(clearance: impl Fn(f64) -> f64, near: f64, far: f64, step_factor: f64, epsilon: f64, max_steps: i32) -> TerrainHit {
-    let mut hit = TerrainHit { distance: -1.0, reached: near, clearance: 0.0, steps: 0 };
+pub fn march_over(
+    clearance: impl Fn(f64) -> f64,
+    near: f64,
+    far: f64,
+    step_factor: f64,
+    epsilon: f64,
+    max_steps: i32,
+) -> TerrainHit {
+    let mut hit = TerrainHit {
+        distance: -1.0,
+        reached: near,
+        clearance: 0.0,
+        steps: 0,
+    };
     let mut t = near;
     while hit.steps < max_steps {
         hit.reached = t;
@@ -124,13 +194,23 @@ pub fn march(
     max_steps: i32,
     octaves: i32,
 ) -> TerrainHit {
-    march_over(|t| ray_clearance(terrain, ground_radius, eye_altitude, dir, t, octaves), near, far, step_factor, epsilon, max_steps)
+    march_over(
+        |t| ray_clearance(terrain, ground_radius, eye_altitude, dir, t, octaves),
+        near,
+        far,
+        step_factor,
+        epsilon,
+        max_steps,
+    )
 }
 
 /// Slope (dh/dx, dh/dz) by central differences over 2 `step`.
 pub fn terrain_slope(terrain: &Terrain, offset: [f64; 2], step: f64, octaves: i32) -> [f64; 2] {
     let h = |dx: f64, dz: f64| height(terrain, [offset[0] + dx, offset[1] + dz], octaves);
-    [(h(step, 0.0) - h(-step, 0.0)) / (2.0 * step), (h(0.0, step) - h(0.0, -step)) / (2.0 * step)]
+    [
+        (h(step, 0.0) - h(-step, 0.0)) / (2.0 * step),
+        (h(0.0, step) - h(0.0, -step)) / (2.0 * step),
+    ]
 }
 
 /// Unit normal in the frame whose +Y is up at the point.
@@ -140,9 +220,19 @@ pub fn local_normal(terrain: &Terrain, offset: [f64; 2], step: f64, octaves: i32
 }
 
 /// Unit normal in the eye's frame.
-pub fn terrain_normal(terrain: &Terrain, ground_radius: f64, eye_altitude: f64, relative: [f64; 3], step: f64, octaves: i32) -> [f64; 3] {
+pub fn terrain_normal(
+    terrain: &Terrain,
+    ground_radius: f64,
+    eye_altitude: f64,
+    relative: [f64; 3],
+    step: f64,
+    octaves: i32,
+) -> [f64; 3] {
     let slope = terrain_slope(terrain, [relative[0], relative[2]], step, octaves);
-    normalize(add(up_at(ground_radius, eye_altitude, relative), [-slope[0], 0.0, -slope[1]]))
+    normalize(add(
+        up_at(ground_radius, eye_altitude, relative),
+        [-slope[0], 0.0, -slope[1]],
+    ))
 }
 
 /// Share of sunlight that reaches a point over any ground.
@@ -165,7 +255,8 @@ pub fn soft_shadow_over(
     let (mut light, mut t) = (1.0f64, 0.0);
     for _ in 0..max_steps {
         let sample = add(start, scale(to_sun, t));
-        let clearance = altitude_of(ground_radius, eye_altitude, sample) - ground([sample[0], sample[2]]);
+        let clearance =
+            altitude_of(ground_radius, eye_altitude, sample) - ground([sample[0], sample[2]]);
         if clearance < epsilon * 0.001 * t {
             return 0.0;
         }
@@ -198,7 +289,20 @@ pub fn soft_shadow(
     octaves: i32,
 ) -> f64 {
     let ground = |p| height(terrain, p, octaves);
-    soft_shadow_over(ground, ground_radius, eye_altitude, relative, normal, to_sun, bias, far, sharpness, step_factor, epsilon, max_steps)
+    soft_shadow_over(
+        ground,
+        ground_radius,
+        eye_altitude,
+        relative,
+        normal,
+        to_sun,
+        bias,
+        far,
+        sharpness,
+        step_factor,
+        epsilon,
+        max_steps,
+    )
 }
 
 /// Irradiances of the three lights.
@@ -219,11 +323,20 @@ pub fn bounce_direction(to_sun: [f64; 3]) -> [f64; 3] {
 }
 
 /// Light received by a surface from sun, sky and bounce.
-pub fn shade_three_lights(lights: &ThreeLights, normal: [f64; 3], to_sun: [f64; 3], shadow: f64) -> [f64; 3] {
+pub fn shade_three_lights(
+    lights: &ThreeLights,
+    normal: [f64; 3],
+    to_sun: [f64; 3],
+    shadow: f64,
+) -> [f64; 3] {
     let direct = dot(normal, to_sun).max(0.0) * shadow;
     let ambient = normal[1].max(0.0);
     let bounce = dot(normal, bounce_direction(to_sun)).max(0.0);
-    std::array::from_fn(|k| direct * lights.sun_color[k] + ambient * lights.sky_color[k] + bounce * lights.bounce_color[k])
+    std::array::from_fn(|k| {
+        direct * lights.sun_color[k]
+            + ambient * lights.sky_color[k]
+            + bounce * lights.bounce_color[k]
+    })
 }
 
 /// Scale, colours and place of the rock.
@@ -252,52 +365,105 @@ pub struct Rock {
 /// One fBm of the rock on a lattice whose axes are finer by whole factors.
 fn rock_noise(rock: &Rock, position: [f64; 3], fineness: [i32; 3], seed: u32) -> f64 {
     let cell = std::array::from_fn(|k| rock.cell[k].wrapping_mul(fineness[k]));
-    let frac = std::array::from_fn(|k| (rock.frac[k] + position[k] / rock.wavelength) * f64::from(fineness[k]));
-    fbm_3d(cell, frac, rock.octaves, rock.hurst, rock.seed.wrapping_add(seed))
+    let frac = std::array::from_fn(|k| {
+        (rock.frac[k] + position[k] / rock.wavelength) * f64::from(fineness[k])
+    });
+    fbm_3d(
+        cell,
+        frac,
+        rock.octaves,
+        rock.hurst,
+        rock.seed.wrapping_add(seed),
+    )
 }
 
 /// Albedo of the rock from one fBm.
 pub fn rock_low(rock: &Rock, position: [f64; 3]) -> [f64; 3] {
-    mix(rock.dark, rock.light, (0.5 + 0.6 * rock_noise(rock, position, [1; 3], 0)).clamp(0.0, 1.0))
+    mix(
+        rock.dark,
+        rock.light,
+        (0.5 + 0.6 * rock_noise(rock, position, [1; 3], 0)).clamp(0.0, 1.0),
+    )
 }
 
 /// Albedo of the rock from four fBm.
 pub fn rock_high(rock: &Rock, position: [f64; 3]) -> [f64; 3] {
     let bulk = rock_noise(rock, position, [1; 3], 0);
-    let strata = rock_noise(rock, add(position, [0.0, 0.5 * bulk * rock.wavelength, 0.0]), [1, 5, 1], 1);
+    let strata = rock_noise(
+        rock,
+        add(position, [0.0, 0.5 * bulk * rock.wavelength, 0.0]),
+        [1, 5, 1],
+        1,
+    );
     let grain = rock_noise(rock, position, [8; 3], 2);
     let stains = rock_noise(rock, position, [2; 3], 3);
     let tone = (0.5 + 0.3 * bulk + 0.3 * strata + 0.25 * grain).clamp(0.0, 1.0);
-    mix(mix(rock.dark, rock.light, tone), rock.stain, 0.6 * smoothstep(0.05, 0.6, stains))
+    mix(
+        mix(rock.dark, rock.light, tone),
+        rock.stain,
+        0.6 * smoothstep(0.05, 0.6, stains),
+    )
 }
 
 /// Mean of a texture over n x n points of a footprint.
-fn filtered(texture: impl Fn([f64; 3]) -> [f64; 3], position: [f64; 3], dpdx: [f64; 3], dpdy: [f64; 3], samples: i32) -> [f64; 3] {
+fn filtered(
+    texture: impl Fn([f64; 3]) -> [f64; 3],
+    position: [f64; 3],
+    dpdx: [f64; 3],
+    dpdy: [f64; 3],
+    samples: i32,
+) -> [f64; 3] {
     let n = samples.max(1);
     let mut sum = [0.0; 3];
     for j in 0..n {
         for i in 0..n {
             let place = |k: i32| (f64::from(k) + 0.5) / f64::from(n) - 0.5;
-            sum = add(sum, texture(add(position, add(scale(dpdx, place(i)), scale(dpdy, place(j))))));
+            sum = add(
+                sum,
+                texture(add(
+                    position,
+                    add(scale(dpdx, place(i)), scale(dpdy, place(j))),
+                )),
+            );
         }
     }
     scale(sum, 1.0 / f64::from(n * n))
 }
 
 /// `rock_low` averaged over a footprint.
-pub fn rock_low_filtered(rock: &Rock, position: [f64; 3], dpdx: [f64; 3], dpdy: [f64; 3], samples: i32) -> [f64; 3] {
+pub fn rock_low_filtered(
+    rock: &Rock,
+    position: [f64; 3],
+    dpdx: [f64; 3],
+    dpdy: [f64; 3],
+    samples: i32,
+) -> [f64; 3] {
     filtered(|p| rock_low(rock, p), position, dpdx, dpdy, samples)
 }
 
 /// `rock_high` averaged over a footprint.
-pub fn rock_high_filtered(rock: &Rock, position: [f64; 3], dpdx: [f64; 3], dpdy: [f64; 3], samples: i32) -> [f64; 3] {
+pub fn rock_high_filtered(
+    rock: &Rock,
+    position: [f64; 3],
+    dpdx: [f64; 3],
+    dpdy: [f64; 3],
+    samples: i32,
+) -> [f64; 3] {
     filtered(|p| rock_high(rock, p), position, dpdx, dpdy, samples)
 }
 
 /// Movement of the point seen from one pixel to the next, on the tangent plane; stretched at most 20 times.
-pub fn surface_footprint(dir: [f64; 3], dir_change: [f64; 3], distance: f64, normal: [f64; 3]) -> [f64; 3] {
+pub fn surface_footprint(
+    dir: [f64; 3],
+    dir_change: [f64; 3],
+    distance: f64,
+    normal: [f64; 3],
+) -> [f64; 3] {
     let facing = dot(dir, normal).min(-0.05);
-    scale(add(dir_change, scale(dir, -dot(dir_change, normal) / facing)), distance)
+    scale(
+        add(dir_change, scale(dir, -dot(dir_change, normal) / facing)),
+        distance,
+    )
 }
 
 /// Share of snow on a slope.

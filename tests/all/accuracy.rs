@@ -73,10 +73,17 @@ pub fn largest_error(device: &[f64], truth: &[f64], relative: bool) -> (f64, usi
 }
 
 /// `count` rows of random columns, as bits for the device and as exact f64 for the twin.
-pub fn rows<const N: usize>(count: usize, seed: u64, mut make: impl FnMut(&mut Random) -> [f32; N]) -> (Vec<u32>, Vec<[f64; N]>) {
+pub fn rows<const N: usize>(
+    count: usize,
+    seed: u64,
+    mut make: impl FnMut(&mut Random) -> [f32; N],
+) -> (Vec<u32>, Vec<[f64; N]>) {
     let mut random = Random(seed);
     let list: Vec<[f32; N]> = (0..count).map(|_| make(&mut random)).collect();
-    (bits(&list), list.iter().map(|row| row.map(f64::from)).collect())
+    (
+        bits(&list),
+        list.iter().map(|row| row.map(f64::from)).collect(),
+    )
 }
 
 /// Rows as bits for the device.
@@ -100,5 +107,9 @@ pub fn direction(random: &mut Random) -> [f32; 3] {
 /// The unit vector of a height above the horizon and an azimuth, both in degrees, azimuth 0 towards +x.
 pub fn toward(height: f64, azimuth: f64) -> [f32; 3] {
     let (h, a) = (height.to_radians(), azimuth.to_radians());
-    [(h.cos() * a.cos()) as f32, h.sin() as f32, (h.cos() * a.sin()) as f32]
+    [
+        (h.cos() * a.cos()) as f32,
+        h.sin() as f32,
+        (h.cos() * a.sin()) as f32,
+    ]
 }

@@ -67,12 +67,29 @@ pub struct Picture {
     pub pixels: Vec<[f32; 4]>,
 }
 
-/// Draws one frame into a texture of `format` (`Rgba32Float` or `Rgba8Unorm`) and reads it back.
+/// Draws one frame of a landscape into a texture of `format` (`Rgba32Float` or a four-byte one) and reads it back.
 pub fn draw(
     landscape: &mut veduta::Landscape,
     view: &veduta::View,
     size: [u32; 2],
     format: wgpu::TextureFormat,
+) -> Picture {
+    let gpu = gpu();
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let _ = landscape
+        .prepare(&gpu.device, &gpu.queue, &mut encoder, view)
+        .unwrap();
+    gpu.queue.submit([encoder.finish()]);
+    draw_with(size, format, |pass| {
+        let _ = landscape.composite(pass);
+    })
+}
+
+/// Records one pass into a texture and reads it back.
+pub fn draw_with(
+    size: [u32; 2],
+    format: wgpu::TextureFormat,
+    record: impl FnOnce(&mut wgpu::RenderPass<'_>),
 ) -> Picture {
     let gpu = gpu();
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -91,21 +108,15 @@ pub fn draw(
     });
     let target = texture.create_view(&Default::default());
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    let _ = landscape
-        .prepare(&gpu.device, &gpu.queue, &mut encoder, view)
-        .unwrap();
-    {
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations::default(),
-            })],
-            ..Default::default()
-        });
-        let _ = landscape.composite(&mut pass);
-    }
+    record(&mut encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: &target,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations::default(),
+        })],
+        ..Default::default()
+    }));
     gpu.queue.submit([encoder.finish()]);
     let data = gpu.read_texture(&texture).unwrap();
     let texel = format.block_copy_size(None).unwrap() as usize;

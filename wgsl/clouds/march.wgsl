@@ -23,7 +23,7 @@ struct CloudLight {
 
 /// Distance from a point within the layer to the layer's edge.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  altitude in [4000, 5500] m lin
 /// domain  mu in [-1, 1] 1 lin
 /// range   [0, 3e5] m
@@ -38,7 +38,7 @@ fn layer_exit(layer: CloudLayer, ground_radius: f32, altitude: f32, mu: f32) -> 
 /// Optical depth of the layer from a point within it towards the sun, up to the layer's edge, by the midpoint rule;
 /// `mu` is the sun's zenith cosine at the point.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  relative in [-1e5, 1e5] m lin
 /// domain  altitude in [4000, 5500] m lin
 /// domain  to_sun in [-1, 1] 1 lin
@@ -63,7 +63,7 @@ fn sun_depth(layer: CloudLayer, ground_radius: f32, relative: vec3<f32>, altitud
 /// Scattering is first order in a step's optical depth: too bright by half of it where the layer is homogeneous.
 /// The error holds for `scatter` and `transmittance`; that of `mean_distance` is 1e-3 of itself.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  eye_altitude in [0, 1e5] m lin
 /// domain  dir in [-1, 1] 1 lin
 /// domain  to_sun in [-1, 1] 1 lin
@@ -108,7 +108,7 @@ fn march_clouds(layer: CloudLayer, ground_radius: f32, eye_altitude: f32, dir: v
 /// The same light with less work: the march to the sun runs only where there is cloud and sun, and the view march ends
 /// when less than `min_transmittance` is left, which bounds the error beside the rounding below (given at 1e-4).
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  eye_altitude in [0, 1e5] m lin
 /// domain  dir in [-1, 1] 1 lin
 /// domain  to_sun in [-1, 1] 1 lin

@@ -4,8 +4,8 @@
 //! symbols  octaves number of octaves [1] · hurst Hurst exponent [1] · offset moves the noise towards positive values [1]
 #define_import_path veduta::fractal::hybrid
 
-#import veduta::noise::lattice::{octave_2d, octave_seed, octave_frequency}
-#import veduta::noise::gradient::{gradient_noise_2d, gradient_noise_2d_slope}
+#import veduta::noise::lattice::{split_2d, finer_2d, shifted_2d, octave_seed, octave_frequency}
+#import veduta::noise::gradient::{gradient_at_2d, gradient_at_2d_slope}
 
 /// Hybrid multifractal of gradient noise in 2D. Musgrave's start values: hurst 0.25, offset 0.7.
 ///
@@ -27,12 +27,14 @@ fn hybrid_multifractal_2d(
     seed: u32,
 ) -> f32 {
     let fall = exp2(-hurst);
+    var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = 1.0;
     var sum = 0.0;
     for (var i = 0; i < octaves; i++) {
-        let p = octave_2d(cell, frac, i, seed);
-        let signal = amplitude * (gradient_noise_2d(p.cell, p.frac, octave_seed(seed, i)) + offset);
+        let q = shifted_2d(p);
+        p = finer_2d(p);
+        let signal = amplitude * (gradient_at_2d(q, octave_seed(seed, i)) + offset);
         weight = min(weight, 1.0) * signal;
         sum += weight;
         amplitude *= fall;
@@ -63,12 +65,14 @@ fn hybrid_multifractal_2d_slope(
     seed: u32,
 ) -> vec3<f32> {
     let fall = exp2(-hurst);
+    var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = vec3<f32>(1.0, 0.0, 0.0);
     var sum = vec3<f32>(0.0);
     for (var i = 0; i < octaves; i++) {
-        let p = octave_2d(cell, frac, i, seed);
-        let n = gradient_noise_2d_slope(p.cell, p.frac, octave_seed(seed, i));
+        let q = shifted_2d(p);
+        p = finer_2d(p);
+        let n = gradient_at_2d_slope(q, octave_seed(seed, i));
         let signal = amplitude * vec3<f32>(n.x + offset, octave_frequency(i) * n.yz);
         let cut = select(weight, vec3<f32>(1.0, 0.0, 0.0), weight.x >= 1.0);
         weight = vec3<f32>(cut.x * signal.x, cut.x * signal.yz + signal.x * cut.yz);

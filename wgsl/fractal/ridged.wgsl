@@ -11,8 +11,8 @@
 //! symbols  smoothness square of the width over which crests are rounded [1]
 #define_import_path veduta::fractal::ridged
 
-#import veduta::noise::lattice::{octave_2d, octave_seed, octave_frequency}
-#import veduta::noise::gradient::{gradient_noise_2d, gradient_noise_2d_slope}
+#import veduta::noise::lattice::{split_2d, finer_2d, shifted_2d, octave_seed, octave_frequency}
+#import veduta::noise::gradient::{gradient_at_2d, gradient_at_2d_slope}
 
 /// |n|, rounded about 0.
 ///
@@ -47,12 +47,14 @@ fn ridged_multifractal_2d(
     seed: u32,
 ) -> f32 {
     let fall = exp2(-hurst);
+    var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = 1.0;
     var sum = 0.0;
     for (var i = 0; i < octaves; i++) {
-        let p = octave_2d(cell, frac, i, seed);
-        let ridge = 1.0 - smooth_abs(gradient_noise_2d(p.cell, p.frac, octave_seed(seed, i)), smoothness);
+        let q = shifted_2d(p);
+        p = finer_2d(p);
+        let ridge = 1.0 - smooth_abs(gradient_at_2d(q, octave_seed(seed, i)), smoothness);
         let signal = ridge * ridge * weight;
         sum += amplitude * signal;
         weight = clamp(signal * gain, 0.0, 1.0);
@@ -86,12 +88,14 @@ fn ridged_multifractal_2d_slope(
     seed: u32,
 ) -> vec3<f32> {
     let fall = exp2(-hurst);
+    var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = vec3<f32>(1.0, 0.0, 0.0);
     var sum = vec3<f32>(0.0);
     for (var i = 0; i < octaves; i++) {
-        let p = octave_2d(cell, frac, i, seed);
-        let n = gradient_noise_2d_slope(p.cell, p.frac, octave_seed(seed, i));
+        let q = shifted_2d(p);
+        p = finer_2d(p);
+        let n = gradient_at_2d_slope(q, octave_seed(seed, i));
         let size = smooth_abs(n.x, smoothness);
         let ridge = 1.0 - size;
         // d size = n / size dn, the sign of n without smoothness; the floor makes it 0 at a crest.
@@ -128,12 +132,14 @@ fn ridged_multifractal_printed_2d(
     seed: u32,
 ) -> f32 {
     let fall = exp2(-hurst);
+    var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = 1.0;
     var sum = 0.0;
     for (var i = 0; i < octaves; i++) {
-        let p = octave_2d(cell, frac, i, seed);
-        let ridge = 1.0 - smooth_abs(gradient_noise_2d(p.cell, p.frac, octave_seed(seed, i)), smoothness);
+        let q = shifted_2d(p);
+        p = finer_2d(p);
+        let ridge = 1.0 - smooth_abs(gradient_at_2d(q, octave_seed(seed, i)), smoothness);
         let signal = select(ridge, ridge * ridge, i == 0) * weight;
         sum += amplitude * signal;
         weight = clamp(signal * gain, 0.0, 1.0);

@@ -1,13 +1,16 @@
 //! Integer hashes of the PCG family: of one word, and mixing bijections of two, three and four words.
 //!
 //! The vector hashes follow the idea of Jarzynski and Olano's pcg2d, pcg3d and pcg4d: one step of a linear congruential
-//! generator a word, then rounds in which one word takes up another one. They depart from the printed forms, because
-//! these fail as lattice hashes. In pcg2d the rounds before the shift are linear: over a 4096 x 4096 block the first word
-//! of cells 16 apart is correlated (64 standard deviations). In pcg3d and pcg4d the rounds are products, so that the low
-//! bits are periodic with short periods, and in the slices where one factor is 0 just 99.756 % of a word's values are
-//! distinct instead of 99.805 %. Here a word takes up the xor-shifted and multiplied value of its neighbour: no product of
-//! two words, and high bits reach the low ones in every round. Every step adds to one word a function of the others, so
-//! each hash is a bijection of its vector. The last steps serve the last words only: who uses `.x` pays for `.x`.
+//! generator a word, then rounds in which words take up one another. They depart from the printed forms, because these
+//! fail as lattice hashes. In pcg2d the rounds before the shift are linear: over a 4096 x 4096 block the first word of
+//! cells 16 apart is correlated (64 standard deviations). In pcg3d and pcg4d the low bits are periodic with short periods,
+//! and in the slices where a factor is 0 just 99.756 % of a word's values are distinct instead of 99.805 %. Here what a
+//! word takes up is xor-shifted and multiplied first, so that high bits reach the low ones in every round. Every step is
+//! invertible: it adds to one word a function of the others, shifts-and-xors it, or multiplies it by an odd number made
+//! of the others; so each hash is a bijection of its vector.
+//!
+//! They are laid out for lattices: what depends on the later words alone comes first, so that neighbours along `x` share
+//! it, then the first word gets one more multiplication and is done; the rounds after that serve the other words.
 //!
 //! source   JarzynskiOlano2020 Hash Functions for GPU Rendering, JCGT 9(3)
 //! source   Leitner2022 listing 5.1
@@ -20,11 +23,19 @@ const INCREMENT: u32 = 1013904223u;
 // Spreads keys that differ little: 2^32 / golden ratio, made odd.
 const KEY_SPREAD: u32 = 2654435761u;
 
-/// One round's contribution of one word to another.
+/// What one word contributes to another in a round.
 ///
 /// internal
 fn stir(word: u32) -> u32 {
-    return (word ^ (word >> 18u)) * MULTIPLIER;
+    return (word ^ (word >> 16u)) * MULTIPLIER;
+}
+
+/// The last steps of a first word: multiplied by an odd number between two xor-shifts.
+///
+/// internal
+fn finish(word: u32, factor: u32) -> u32 {
+    let product = (word ^ (word >> 15u)) * (factor | 1u);
+    return product ^ (product >> 15u);
 }
 
 /// PCG hash of one word, the RXS-M-XS permutation of one generator step: a bijection.
@@ -48,9 +59,8 @@ fn pcg(x: u32) -> u32 {
 /// source  JarzynskiOlano2020 pcg2d; departs: see the module
 fn pcg_2d_keyed(v: vec2<u32>, key: u32) -> vec2<u32> {
     var w = v * MULTIPLIER + INCREMENT;
-    w.x += stir(w.y) ^ (key * KEY_SPREAD);
-    w.y += stir(w.x);
-    w.x += stir(w.y);
+    let row = stir(w.y) ^ (key * KEY_SPREAD);
+    w.x = finish(w.x + row, row);
     w.y += stir(w.x);
     return w;
 }
@@ -67,8 +77,6 @@ fn pcg_2d(v: vec2<u32>) -> vec2<u32> {
 
 /// Mixing hash of three words with a key: for every key another bijection of the vector.
 ///
-/// What depends on `y` and `z` alone comes first, so that neighbours along `x` share it.
-///
 /// domain  v in [0, 4294967295] 1 lin
 /// domain  key in [0, 4294967295] 1 lin
 /// range   [0, 4294967295] 1
@@ -77,9 +85,7 @@ fn pcg_2d(v: vec2<u32>) -> vec2<u32> {
 fn pcg_3d_keyed(v: vec3<u32>, key: u32) -> vec3<u32> {
     var w = v * MULTIPLIER + INCREMENT;
     w.y += stir(w.z);
-    w.x += stir(w.y) ^ (key * KEY_SPREAD);
-    w.y += stir(w.x);
-    w.x += stir(w.y ^ w.z);
+    w.x = finish(w.x + ((stir(w.y) + w.z) ^ (key * KEY_SPREAD)), w.y);
     w.z += stir(w.x ^ w.y);
     w.y += stir(w.z);
     return w;

@@ -15,7 +15,7 @@
 #define_import_path veduta::noise::gradient
 
 #import veduta::hash::lattice::{lattice_hash_2d, lattice_hash_3d}
-#import veduta::noise::lattice::{split_2d, split_3d, fade_2d, fade_3d, fade_slope_2d, fade_slope_3d}
+#import veduta::noise::lattice::{Lattice2d, Lattice3d, split_2d, split_3d, fade_2d, fade_3d, fade_slope_2d, fade_slope_3d}
 
 const SIGN: u32 = 2147483648u;
 // The icosahedron's two coordinates times 2/sqrt(3).
@@ -66,16 +66,10 @@ fn lattice_gradient_3d(cell: vec3<i32>, seed: u32) -> vec3<f32> {
     );
 }
 
-/// Gradient noise in 2D.
+/// Gradient noise at a normalised 2D position.
 ///
-/// domain  cell in [-2147483648, 2147483647] cell lin
-/// domain  frac in [0, 1] cell lin
-/// domain  seed in [0, 4294967295] 1 lin
-/// range   [-1, 1] 1
-/// error   7e-7 abs of reference::noise::gradient_noise_2d
-/// source  Leitner2022 3.7
-fn gradient_noise_2d(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> f32 {
-    let p = split_2d(cell, frac);
+/// internal
+fn gradient_at_2d(p: Lattice2d, seed: u32) -> f32 {
     let c = p.cell;
     let t = p.frac;
     let s = t - 1.0;
@@ -88,16 +82,22 @@ fn gradient_noise_2d(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> f32 {
     return (n00 * g.x + n10 * f.x) * g.y + (n01 * g.x + n11 * f.x) * f.y;
 }
 
-/// Gradient noise in 3D.
+/// Gradient noise in 2D.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
 /// domain  frac in [0, 1] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-1, 1] 1
-/// error   7e-7 abs of reference::noise::gradient_noise_3d
-/// source  Leitner2022 3.7; departs: 24 directions
-fn gradient_noise_3d(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
-    let p = split_3d(cell, frac);
+/// error   7e-7 abs of reference::noise::gradient_noise_2d
+/// source  Leitner2022 3.7
+fn gradient_noise_2d(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> f32 {
+    return gradient_at_2d(split_2d(cell, frac), seed);
+}
+
+/// Gradient noise at a normalised 3D position.
+///
+/// internal
+fn gradient_at_3d(p: Lattice3d, seed: u32) -> f32 {
     let c = p.cell;
     let t = p.frac;
     let s = t - 1.0;
@@ -116,16 +116,22 @@ fn gradient_noise_3d(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
     return n0 * g.z + n1 * f.z;
 }
 
-/// Gradient noise in 2D and its gradient: (value, d/dx, d/dy), per cell.
+/// Gradient noise in 3D.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
 /// domain  frac in [0, 1] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
-/// range   [-6, 6] 1
-/// error   2e-6 abs of reference::noise::gradient_noise_2d_slope
-/// source  Leitner2022 3.7; Quilez2017 Gradient noise derivatives
-fn gradient_noise_2d_slope(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> vec3<f32> {
-    let p = split_2d(cell, frac);
+/// range   [-1, 1] 1
+/// error   7e-7 abs of reference::noise::gradient_noise_3d
+/// source  Leitner2022 3.7; departs: 24 directions
+fn gradient_noise_3d(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
+    return gradient_at_3d(split_3d(cell, frac), seed);
+}
+
+/// Gradient noise and its gradient at a normalised 2D position.
+///
+/// internal
+fn gradient_at_2d_slope(p: Lattice2d, seed: u32) -> vec3<f32> {
     let c = p.cell;
     let t = p.frac;
     let s = t - 1.0;
@@ -146,16 +152,22 @@ fn gradient_noise_2d_slope(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> vec3<
     return vec3<f32>(n0 * g.y + n1 * f.y, mean + fade_slope_2d(t) * across);
 }
 
-/// Gradient noise in 3D and its gradient: (value, d/dx, d/dy, d/dz), per cell.
+/// Gradient noise in 2D and its gradient: (value, d/dx, d/dy), per cell.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
 /// domain  frac in [0, 1] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-6, 6] 1
-/// error   2e-6 abs of reference::noise::gradient_noise_3d_slope
+/// error   2e-6 abs of reference::noise::gradient_noise_2d_slope
 /// source  Leitner2022 3.7; Quilez2017 Gradient noise derivatives
-fn gradient_noise_3d_slope(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> vec4<f32> {
-    let p = split_3d(cell, frac);
+fn gradient_noise_2d_slope(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> vec3<f32> {
+    return gradient_at_2d_slope(split_2d(cell, frac), seed);
+}
+
+/// Gradient noise and its gradient at a normalised 3D position.
+///
+/// internal
+fn gradient_at_3d_slope(p: Lattice3d, seed: u32) -> vec4<f32> {
     let c = p.cell;
     let t = p.frac;
     let s = t - 1.0;
@@ -193,4 +205,16 @@ fn gradient_noise_3d_slope(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> vec4<
     let mean0 = (g000 * g.x + g100 * f.x) * g.y + (g010 * g.x + g110 * f.x) * f.y;
     let mean1 = (g001 * g.x + g101 * f.x) * g.y + (g011 * g.x + g111 * f.x) * f.y;
     return vec4<f32>(n0 * g.z + n1 * f.z, mean0 * g.z + mean1 * f.z + fade_slope_3d(t) * across);
+}
+
+/// Gradient noise in 3D and its gradient: (value, d/dx, d/dy, d/dz), per cell.
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  frac in [0, 1] cell lin
+/// domain  seed in [0, 4294967295] 1 lin
+/// range   [-6, 6] 1
+/// error   2e-6 abs of reference::noise::gradient_noise_3d_slope
+/// source  Leitner2022 3.7; Quilez2017 Gradient noise derivatives
+fn gradient_noise_3d_slope(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> vec4<f32> {
+    return gradient_at_3d_slope(split_3d(cell, frac), seed);
 }

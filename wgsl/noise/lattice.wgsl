@@ -3,19 +3,17 @@
 //! The cell is an integer and the fraction small, so that a noise is as exact at cell 100 000 000 as at 0. Cells wrap at
 //! 2^32.
 //!
-//! The lattice of octave i is 2^i times as fine and shifted by a constant, or all octaves would share the lattice points
-//! of the first one, where gradient noise is 0 and value noise flat. The shifts are odd multiples of 1/64 (octave 0: none):
-//! 2^k times any multiple of 1/64 is an even one, so that no lattice point of one octave is one of another. They step by
-//! the fractional parts of the powers of the plastic number (in 3D of its successor), which spreads them evenly.
+//! Octave i of a fractal lies at 2^i p + d. Without the shift d all octaves would share the lattice points of the first one,
+//! where gradient noise is 0 and value noise flat. d is made of odd multiples of 1/64: a lattice point n of octave i lies at
+//! 2^k n - (2^k - 1) d of octave i + k, which is no whole number. The multiples are those that keep it farthest from one:
+//! a third of a cell in 2D, 0.44 in 3D, for all k.
 //!
-//! source   Perlin2002 Improving noise (quintic fade); Roberts2018 R2 and R3 sequences (shifts)
+//! source   Perlin2002 Improving noise (quintic fade)
 //! symbols  cell lattice point [cell] · frac position within the cell [cell] · i octave [1]
 #define_import_path veduta::noise::lattice
 
-// 2^32 times the inverse powers of the plastic number (2D) and of the root of x^4 = x + 1 (3D).
-const SHIFT_STEP_2D: vec2<u32> = vec2<u32>(3242174889u, 2447445413u);
-const SHIFT_STEP_3D: vec3<u32> = vec3<u32>(3518319155u, 2882110345u, 2360945575u);
-const SEED_SPREAD: u32 = 2654435761u;
+const SHIFT_2D: vec2<f32> = vec2<f32>(0.171875, 0.390625);
+const SHIFT_3D: vec3<f32> = vec3<f32>(0.171875, 0.203125, 0.390625);
 // 2^32 / golden ratio.
 const SEED_STEP: u32 = 2654435769u;
 
@@ -35,31 +33,47 @@ struct Lattice3d {
     frac: vec3<f32>,
 }
 
+/// A whole number of at most 2^22 as an integer, exact: 1.5 x 2^23 + n has n in its low bits.
+///
+/// A plain conversion costs several times as much, because WGSL wants it clamped.
+///
+/// internal
+fn integer_2d(n: vec2<f32>) -> vec2<i32> {
+    return bitcast<vec2<i32>>(n + 12582912.0) - 0x4b400000;
+}
+
+/// A whole number of at most 2^22 as an integer, three at once.
+///
+/// internal
+fn integer_3d(n: vec3<f32>) -> vec3<i32> {
+    return bitcast<vec3<i32>>(n + 12582912.0) - 0x4b400000;
+}
+
 /// Moves the whole cells of the fraction into the cell.
 ///
 /// The new fraction is exact, except that of a negative fraction above -2^-1, which is rounded to 2^-25; it is 1 just for
 /// those above -2^-25.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
-/// domain  frac in [-8388608, 8388608] cell lin
+/// domain  frac in [-4194304, 4194304] cell lin
 /// range   [0, 1] cell
 /// error   3e-8 abs of reference::noise::split_2d
 /// source  ours
 fn split_2d(cell: vec2<i32>, frac: vec2<f32>) -> Lattice2d {
     let whole = floor(frac);
-    return Lattice2d(cell + vec2<i32>(whole), frac - whole);
+    return Lattice2d(cell + integer_2d(whole), frac - whole);
 }
 
 /// Moves the whole cells of the fraction into the cell.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
-/// domain  frac in [-8388608, 8388608] cell lin
+/// domain  frac in [-4194304, 4194304] cell lin
 /// range   [0, 1] cell
 /// error   3e-8 abs of reference::noise::split_3d
 /// source  ours
 fn split_3d(cell: vec3<i32>, frac: vec3<f32>) -> Lattice3d {
     let whole = floor(frac);
-    return Lattice3d(cell + vec3<i32>(whole), frac - whole);
+    return Lattice3d(cell + integer_3d(whole), frac - whole);
 }
 
 /// 2^i, exact.
@@ -76,7 +90,7 @@ fn octave_frequency(i: i32) -> f32 {
 /// The seed of octave i; that of octave 0 is the seed itself.
 ///
 /// domain  seed in [0, 4294967295] 1 lin
-/// domain  i in [0, 22] 1 lin
+/// domain  i in [0, 21] 1 lin
 /// range   [0, 4294967295] 1
 /// error   0 abs of reference::noise::octave_seed
 /// source  ours
@@ -84,67 +98,83 @@ fn octave_seed(seed: u32, i: i32) -> u32 {
     return seed + bitcast<u32>(i) * SEED_STEP;
 }
 
-/// The shift of octave i's lattice: an odd multiple of 1/64 a component, 0 for octave 0.
+/// A position on a lattice twice as fine, exact.
 ///
-/// domain  i in [0, 22] 1 lin
-/// domain  seed in [0, 4294967295] 1 lin
-/// range   [0, 1] cell
-/// error   0 abs of reference::noise::octave_shift_2d
-/// source  Roberts2018 R2 sequence, from a seed-derived start, rounded
-fn octave_shift_2d(i: i32, seed: u32) -> vec2<f32> {
-    let word = vec2<u32>(seed * SEED_SPREAD) + bitcast<u32>(i) * SHIFT_STEP_2D;
-    let shift = vec2<f32>(bitcast<vec2<i32>>((word >> vec2<u32>(26u)) | vec2<u32>(1u))) * 0.015625;
-    return select(shift, vec2<f32>(0.0), i == 0);
+/// internal
+fn finer_2d(p: Lattice2d) -> Lattice2d {
+    let over = p.frac >= vec2<f32>(0.5);
+    return Lattice2d(
+        p.cell + p.cell + select(vec2<i32>(0), vec2<i32>(1), over),
+        p.frac + p.frac - select(vec2<f32>(0.0), vec2<f32>(1.0), over),
+    );
 }
 
-/// The shift of octave i's lattice in 3D.
+/// A position on a lattice twice as fine in 3D, exact.
 ///
-/// domain  i in [0, 22] 1 lin
-/// domain  seed in [0, 4294967295] 1 lin
-/// range   [0, 1] cell
-/// error   0 abs of reference::noise::octave_shift_3d
-/// source  Roberts2018 R3 sequence, from a seed-derived start, rounded
-fn octave_shift_3d(i: i32, seed: u32) -> vec3<f32> {
-    let word = vec3<u32>(seed * SEED_SPREAD) + bitcast<u32>(i) * SHIFT_STEP_3D;
-    let shift = vec3<f32>(bitcast<vec3<i32>>((word >> vec3<u32>(26u)) | vec3<u32>(1u))) * 0.015625;
-    return select(shift, vec3<f32>(0.0), i == 0);
+/// internal
+fn finer_3d(p: Lattice3d) -> Lattice3d {
+    let over = p.frac >= vec3<f32>(0.5);
+    return Lattice3d(
+        p.cell + p.cell + select(vec3<i32>(0), vec3<i32>(1), over),
+        p.frac + p.frac - select(vec3<f32>(0.0), vec3<f32>(1.0), over),
+    );
 }
 
-/// A position on the lattice of octave i.
+/// A position shifted as all octaves are; rounds once, by at most 2^-24.
+///
+/// internal
+fn shifted_2d(p: Lattice2d) -> Lattice2d {
+    let frac = p.frac + SHIFT_2D;
+    let over = frac >= vec2<f32>(1.0);
+    return Lattice2d(
+        p.cell + select(vec2<i32>(0), vec2<i32>(1), over),
+        frac - select(vec2<f32>(0.0), vec2<f32>(1.0), over),
+    );
+}
+
+/// A position shifted as all octaves are, in 3D.
+///
+/// internal
+fn shifted_3d(p: Lattice3d) -> Lattice3d {
+    let frac = p.frac + SHIFT_3D;
+    let over = frac >= vec3<f32>(1.0);
+    return Lattice3d(
+        p.cell + select(vec3<i32>(0), vec3<i32>(1), over),
+        frac - select(vec3<f32>(0.0), vec3<f32>(1.0), over),
+    );
+}
+
+/// A position on the lattice of octave i: 2^i p + d.
 ///
 /// Scaling by 2^i and taking off the whole cells are exact; adding the shift rounds once, by at most 2^-24. The
-/// fraction must be below 2^23 / 2^i.
+/// fraction must be below 2^22 / 2^i.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
 /// domain  frac in [0, 1] cell lin
-/// domain  i in [0, 22] 1 lin
-/// domain  seed in [0, 4294967295] 1 lin
+/// domain  i in [0, 21] 1 lin
 /// range   [0, 1] cell
 /// error   6e-8 abs of reference::noise::octave_2d
 /// source  Leitner2022 alg. 1; departs: shifted lattices, integer cells
-fn octave_2d(cell: vec2<i32>, frac: vec2<f32>, i: i32, seed: u32) -> Lattice2d {
+fn octave_2d(cell: vec2<i32>, frac: vec2<f32>, i: i32) -> Lattice2d {
     let scaled = frac * octave_frequency(i);
     let whole = floor(scaled);
-    let shifted = (scaled - whole) + octave_shift_2d(i, seed);
-    let carry = floor(shifted);
-    return Lattice2d((cell << vec2<u32>(bitcast<u32>(i))) + vec2<i32>(whole + carry), shifted - carry);
+    let fine = (cell << vec2<u32>(bitcast<u32>(i))) + integer_2d(whole);
+    return shifted_2d(Lattice2d(fine, scaled - whole));
 }
 
-/// A position on the lattice of octave i in 3D.
+/// A position on the lattice of octave i in 3D: 2^i p + d.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
 /// domain  frac in [0, 1] cell lin
-/// domain  i in [0, 22] 1 lin
-/// domain  seed in [0, 4294967295] 1 lin
+/// domain  i in [0, 21] 1 lin
 /// range   [0, 1] cell
 /// error   6e-8 abs of reference::noise::octave_3d
 /// source  Leitner2022 alg. 1; departs: shifted lattices, integer cells
-fn octave_3d(cell: vec3<i32>, frac: vec3<f32>, i: i32, seed: u32) -> Lattice3d {
+fn octave_3d(cell: vec3<i32>, frac: vec3<f32>, i: i32) -> Lattice3d {
     let scaled = frac * octave_frequency(i);
     let whole = floor(scaled);
-    let shifted = (scaled - whole) + octave_shift_3d(i, seed);
-    let carry = floor(shifted);
-    return Lattice3d((cell << vec3<u32>(bitcast<u32>(i))) + vec3<i32>(whole + carry), shifted - carry);
+    let fine = (cell << vec3<u32>(bitcast<u32>(i))) + integer_3d(whole);
+    return shifted_3d(Lattice3d(fine, scaled - whole));
 }
 
 /// The cell wrapped into [0, period), also from negative cells.

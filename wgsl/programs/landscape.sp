@@ -173,6 +173,7 @@ override MAX_CLOUD_DISTANCE: f32 = 80000.0;
 #endif
 
 const FAR: f32 = 1e9;
+const INVERSE_PI: f32 = 0.31830989;
 const ROCK_OCTAVES: i32 = 5;
 const CLOUD_OCTAVES: i32 = 6;
 const SNOW_OCTAVES: i32 = 4;
@@ -264,7 +265,7 @@ fn surface(dir: vec3<f32>, dir_right: vec3<f32>, dir_down: vec3<f32>, distance: 
     let snow = snow_blend(dot(normal, up), border, content.snow_edge_low, content.snow_edge_high, content.snow_noise);
     let albedo = mix(stone_albedo, content.snow_albedo, snow);
     let mu = dot(up, view.to_sun);
-    return albedo * shade_three_lights(three_lights(altitude, mu), normal, view.to_sun, shadow.light);
+    return INVERSE_PI * albedo * shade_three_lights(three_lights(altitude, mu), normal, view.to_sun, shadow.light);
 }
 #endif
 
@@ -303,7 +304,7 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
         distance = on_sphere;
         // The bare planet, which is also what stands for terrain beyond the farthest step.
         let up = up_at(content.planet_radius, view.eye_altitude, dir * on_sphere);
-        color = content.rock_dark * shade_three_lights(three_lights(0.0, dot(up, view.to_sun)), up, view.to_sun, 1.0);
+        color = INVERSE_PI * content.rock_dark * shade_three_lights(three_lights(0.0, dot(up, view.to_sun)), up, view.to_sun, 1.0);
     }
 #ifdef ATMOSPHERE
     if distance == FAR {
@@ -315,8 +316,8 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
 #endif
 #ifdef CLOUDS
 #ifndef LOW_QUALITY
-    let layer = CloudLayer(anchors.cloud_cell, anchors.cloud_frac, content.cloud_scale, content.cloud_period,
-        CLOUD_OCTAVES, 1.0, content.clouds_height, content.clouds_thickness, content.cloud_coverage, 0.0,
+    let layer = CloudLayer(anchors.cloud_cell, anchors.cloud_frac, content.cloud_scale, content.cloud_period, 1.0,
+        content.clouds_height, content.clouds_thickness, content.cloud_coverage, 0.0,
         content.cloud_density * (content.cloud_scattering + content.cloud_absorption),
         content.cloud_scattering / max(content.cloud_scattering + content.cloud_absorption, 1e-20),
         content.cloud_g_forward, content.cloud_g_backward, content.cloud_backward_share, content.cloud_seed);

@@ -21,7 +21,7 @@ struct TerrainHit {
 
 /// Clearance above the ground at distance `t` along a ray from the eye.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  eye_altitude in [0, 1e5] m lin
 /// domain  dir in [-1, 1] 1 lin
 /// domain  octaves in [1, 16] 1 lin
@@ -36,7 +36,7 @@ fn ray_clearance(terrain: Terrain, ground_radius: f32, eye_altitude: f32, dir: v
 /// First sample below the ground on a ray walked in equal steps from `near`; `interpolate` places the hit on the
 /// straight line between the last two clearances. Ends without a hit past `far` or after `max_steps` samples.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  eye_altitude in [0, 1e5] m lin
 /// domain  dir in [-1, 1] 1 lin
 /// domain  near in [0, 1e3] m lin
@@ -73,7 +73,7 @@ fn march_constant(terrain: Terrain, ground_radius: f32, eye_altitude: f32, dir: 
 /// epsilon * 0.001 * t, which grows in proportion to the distance as detail on the screen shrinks.
 /// A factor of 1 / sqrt(1 + slope^2) or less cannot pass a slope; never returns a distance beyond `far`.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  eye_altitude in [0, 1e5] m lin
 /// domain  dir in [-1, 1] 1 lin
 /// domain  near in [0, 1e3] m lin

@@ -39,7 +39,7 @@ fn local_normal(terrain: Terrain, offset: vec2<f32>, step: f32, octaves: i32) ->
 /// Unit normal in the eye's frame at a point given relative to the eye: the gradient of altitude minus height, which is
 /// exact for the surface that the march meets.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  eye_altitude in [0, 1e5] m lin
 /// domain  relative in [-1e5, 1e5] m lin
 /// domain  step in [1, 1000] m log

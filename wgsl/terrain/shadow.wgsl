@@ -18,7 +18,7 @@ struct TerrainShadow {
 /// and between them the smallest sharpness * clearance / t on the way, so that shadows harden towards their contact.
 /// The ray starts `bias` metres along the normal.
 ///
-/// domain  ground_radius in [1e5, 1e8] m log
+/// domain  ground_radius in [3e6, 1e8] m log
 /// domain  eye_altitude in [0, 1e5] m lin
 /// domain  normal in [-1, 1] 1 lin
 /// domain  to_sun in [-1, 1] 1 lin

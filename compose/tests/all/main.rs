@@ -3,5 +3,6 @@
 mod emit;
 mod faults;
 mod fuzz;
+mod gates;
 mod link;
 mod readers;

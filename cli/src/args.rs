@@ -1,0 +1,46 @@
+//! The arguments of `veduta`.
+
+use clap::{Parser, Subcommand};
+
+use crate::commands;
+
+/// Outdoor landscapes for wgpu: render, compose, lint, list, eval.
+#[derive(Debug, Clone, Parser)]
+#[command(name = "veduta", version, about, arg_required_else_help = true)]
+pub struct Args {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Clone, Subcommand)]
+#[allow(clippy::large_enum_variant)] // There is one of them.
+pub enum Command {
+    /// Draw a scene into a picture
+    Render(commands::render::RenderArgs),
+    /// Write a program as plain WGSL, SPIR-V, HLSL or MSL
+    Compose(commands::compose::ComposeArgs),
+    /// Check modules, programs, presets, scenes and views; for continuous integration
+    Lint(commands::lint::LintArgs),
+    /// Show what there is: programs, presets, scenes, views, keys, adapters
+    List(commands::list::ListArgs),
+    /// Evaluate a WGSL expression over rows of numbers on the device
+    Eval(commands::eval::EvalArgs),
+}
+
+impl Args {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// Whatever the command reports.
+    pub fn run(&self) -> Result<(), crate::CliError> {
+        match &self.command {
+            Command::Render(args) => commands::render::run(args),
+            Command::Compose(args) => commands::compose::run(args),
+            Command::Lint(args) => commands::lint::run(args),
+            Command::List(args) => commands::list::run(args),
+            Command::Eval(args) => commands::eval::run(args),
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! One module a command: its arguments and `run`.
+
+pub mod compose;
+pub mod eval;
+pub mod lint;
+pub mod list;
+pub mod render;

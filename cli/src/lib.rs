@@ -1,0 +1,15 @@
+//! The library behind the command `veduta`: rendering in tiles, pictures and tables as files, run-time composition.
+
+pub mod args;
+pub mod camera;
+pub mod catalog;
+pub mod commands;
+pub mod cpu;
+pub mod error;
+pub mod image;
+pub mod render;
+pub mod shipped;
+pub mod table;
+
+pub use args::Args;
+pub use error::CliError;

@@ -1,0 +1,104 @@
+//! `veduta lint`.
+
+use std::path::Path;
+
+use crate::common::{copy_fixture, folder, veduta};
+
+#[test]
+fn a_good_project_has_no_fault() {
+    let dir = folder("lint_good");
+    copy_fixture("user_project/good", &dir);
+    let run = veduta(&dir, &["lint", "shaders", "presets"]).good();
+    assert_eq!(run.out, "");
+    // Six files; one flag makes two variants.
+    assert!(run.err.contains("6 files and"), "{}", run.err);
+    let json = veduta(&dir, &["lint", "--json", "."]).good().json();
+    assert_eq!(json, serde_json::json!([]));
+}
+
+#[test]
+fn every_fault_has_its_place() {
+    let dir = folder("lint_faulty");
+    copy_fixture("user_project/faulty", &dir);
+    let run = veduta(&dir, &["lint", "--json", "shaders", "presets"]).bad(1, &["faults found"]);
+    let faults = run.json();
+    let faults = faults.as_array().unwrap();
+    for fault in faults {
+        for field in ["file", "message", "source"] {
+            assert!(fault[field].is_string(), "{fault}");
+        }
+        assert!(fault["line"].is_u64() && fault["column"].is_u64() && fault["notes"].is_array());
+    }
+    // File, text at the place, a word of the message.
+    for (file, at, word) in [
+        ("presets/coarse.ron", "30", "30"),
+        ("presets/coarse.ron", "\"OCTAVE\"", "`OCTAVE`"),
+        ("presets/views/hut.ron", "200.0", "pitch_deg"),
+        ("shaders/hills.wgsl", "fbm_2}", "fbm_2"),
+        ("shaders/map.sp", "TERRACE", "TERRACE"),
+    ] {
+        let found = faults.iter().find(|f| {
+            f["file"] == file && f["message"].as_str().unwrap().contains(word)
+        });
+        let fault = found.unwrap_or_else(|| panic!("no fault of {word} in {faults:#?}"));
+        let text = std::fs::read_to_string(dir.join(file)).unwrap();
+        let line = text.lines().nth(fault["line"].as_u64().unwrap() as usize - 1).unwrap();
+        assert_eq!(fault["source"], line);
+        let rest: String = line.chars().skip(fault["column"].as_u64().unwrap() as usize - 1).collect();
+        assert!(rest.starts_with(at), "{fault} points at {rest}");
+    }
+    let text = veduta(&dir, &["lint", "shaders", "presets"]).bad(1, &["faults found"]);
+    assert!(text.out.contains("shaders/hills.wgsl:4:"), "{}", text.out);
+    assert!(text.out.contains("#import veduta::fractal::fbm::{fbm_2}\n"), "{}", text.out);
+}
+
+#[test]
+fn variants_are_composed() {
+    let dir = folder("lint_variant");
+    copy_fixture("user_project/good", &dir);
+    // Broken only when the flag is on.
+    let path = dir.join("shaders/map.sp");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let broken = text.replace("height = floor(8.0 * height) / 8.0;", "height = flor(8.0 * height) / 8.0;");
+    assert_ne!(text, broken);
+    std::fs::write(&path, broken).unwrap();
+    let run = veduta(&dir, &["lint", "shaders", "presets"]).bad(1, &["1 fault found"]);
+    assert!(run.out.contains("shaders/map.sp:22:") && run.out.contains("flor"), "{}", run.out);
+    assert!(run.out.contains("TERRACES"), "{}", run.out);
+}
+
+#[test]
+fn what_ships_has_no_fault() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let run = veduta(&root, &["lint", "--no-shipped", "--headers", "wgsl", "presets"]).good();
+    assert_eq!(run.out, "");
+}
+
+#[test]
+fn paths_and_files_of_others() {
+    let dir = folder("lint_paths");
+    veduta(&dir, &["lint", "nowhere"]).bad(1, &["path `nowhere` does not exist"]);
+    std::fs::write(dir.join("notes.txt"), "").unwrap();
+    veduta(&dir, &["lint", "notes.txt"]).bad(1, &["notes.txt", ".wgsl, .sp or .ron"]);
+    std::fs::write(dir.join("window.ron"), "(width: 3)").unwrap();
+    veduta(&dir, &["lint", "."]).good();
+    let run = veduta(&dir, &["lint", "window.ron"]).bad(1, &["1 fault"]);
+    assert!(run.out.contains("window.ron: is neither"), "{}", run.out);
+    std::fs::write(dir.join("latin.wgsl"), b"// caf\xe9\n").unwrap();
+    let run = veduta(&dir, &["lint", "."]).bad(1, &["1 fault"]);
+    assert!(run.out.contains("latin.wgsl: is not UTF-8 after byte 6"), "{}", run.out);
+}
+
+#[test]
+fn broken_keys_and_clashes_are_told() {
+    let dir = folder("lint_keys");
+    copy_fixture("user_project/good", &dir);
+    std::fs::copy(dir.join("presets/scenes/dusk.ron"), dir.join("presets/scenes/thesis.ron")).unwrap();
+    let run = veduta(&dir, &["lint", "."]).bad(1, &["fault"]);
+    assert!(run.out.contains("a second scene `thesis`"), "{}", run.out);
+    let keys = dir.join("presets/keys.ron");
+    let text = std::fs::read_to_string(&keys).unwrap().replace("TERRACES", "CLOUDS");
+    std::fs::write(&keys, text).unwrap();
+    let run = veduta(&dir, &["lint", "."]).bad(1, &["fault"]);
+    assert!(run.out.contains("presets/keys.ron:2:12: key `CLOUDS` is declared twice"), "{}", run.out);
+}

@@ -1,0 +1,10 @@
+//! The command line from end to end.
+
+mod ci_job;
+mod common;
+mod compose;
+mod eval;
+mod lint;
+mod list;
+mod render;
+mod usage;
