@@ -136,7 +136,11 @@ fn with_absolute_paths(manifest: &str, home: &Path) -> String {
     while let Some((before, after)) = rest.split_once(KEY) {
         let (path, after) = after.split_once('"').unwrap();
         let folder = home.join(path);
-        let path = if folder.is_dir() { plain(&folder) } else { path.to_owned() };
+        let path = if folder.is_dir() {
+            plain(&folder)
+        } else {
+            path.to_owned()
+        };
         text += &format!("{before}{KEY}{path}\"");
         rest = after;
     }
@@ -187,7 +191,14 @@ fn copy_crate(from: &Path, to: &Path) {
 fn make_workspace(folder: &Path, members: &[&str], more: &str) {
     let ours = fs::read_to_string(root().join("Cargo.toml")).unwrap();
     let dependencies = sections(&ours, |h| h == "[workspace.dependencies]");
-    let profiles = sections(&ours, |h| h.starts_with("[profile"));
+    let mut profiles = sections(&ours, |h| h.starts_with("[profile"));
+    // What these crates do takes no time; how long they take to compile matters.
+    for name in ["veduta", "veduta-cli"] {
+        let header = format!("[profile.release.package.{name}]");
+        if !profiles.contains(&header) {
+            profiles += &format!("\n{header}\nopt-level = 0\n");
+        }
+    }
     assert!(dependencies.contains("wgpu") && profiles.contains("[profile.release]"));
     write(
         &folder.join("Cargo.toml"),
@@ -309,8 +320,12 @@ fn three_ways_of_switching_and_what_a_rebuild_does() {
     let _alone = alone();
     let folder = lay_out();
     let start = Instant::now();
-    build(&folder).expect_success();
-    println!("fixtures built in {:.1?}", start.elapsed());
+    let built = build(&folder).expect_success();
+    println!(
+        "fixtures built in {:.1?}; compiled {:?}",
+        start.elapsed(),
+        built.compiled()
+    );
 
     let normal = shipped_text(Preset::Thesis);
     let low = shipped_text(Preset::ThesisLow);
@@ -408,22 +423,23 @@ fn stranger_is_rebuilt_when_and_only_when_needed(folder: &Path) {
     let (line, _) = after
         .lines()
         .enumerate()
-        .find(|(_, l)| l.contains("gradient_noise_2d("))
+        .find(|(_, l)| l.contains("gradient_noise_2d"))
         .unwrap();
     fs::write(
         &file,
-        after.replace("gradient_noise_2d(", "gradient_nose_2d("),
+        after.replace("gradient_noise_2d", "gradient_nose_2d"),
     )
     .unwrap();
     let broken = build(folder);
     assert!(!broken.success);
     let place = format!("hills.sp:{}:", line + 1);
-    assert!(broken.stderr.contains(&place), "{place}\n{}", broken.stderr);
-    assert!(
-        broken.stderr.contains("gradient_nose_2d"),
-        "{}",
-        broken.stderr
-    );
+    for part in [
+        place.as_str(),
+        "`gradient_nose_2d`",
+        "did you mean `gradient_noise_2d`?",
+    ] {
+        assert!(broken.stderr.contains(part), "{part}\n{}", broken.stderr);
+    }
 
     // Back as it was.
     fs::write(&file, before).unwrap();
@@ -511,21 +527,29 @@ fn composing_everything_takes_at_most_3_seconds_and_repeats_byte_by_byte() {
             .iter()
             .any(|(name, _)| name == Path::new("veduta_programs.rs"))
     );
+    let limit = Duration::from_secs(3);
     let mut best = Duration::MAX;
-    for run in 0..3 {
-        let out = scratch().join(format!("composed-{run}"));
+    // Other programs only make it slower, so that the best of a few runs counts.
+    for run in 0..6 {
+        if run >= 2 && best <= limit {
+            break;
+        }
+        let out = scratch().join("composed");
         if out.exists() {
             fs::remove_dir_all(&out).unwrap();
         }
         fs::create_dir_all(&out).unwrap();
+        let mut command = Command::new(&script);
+        command
+            .current_dir(root())
+            .env("CARGO_MANIFEST_DIR", root())
+            .env("OUT_DIR", &out)
+            .env_remove("CARGO_FEATURE_LOW_QUALITY");
+        if cfg!(feature = "low_quality") {
+            command.env("CARGO_FEATURE_LOW_QUALITY", "1");
+        }
         let start = Instant::now();
-        Outcome::of(
-            Command::new(&script)
-                .current_dir(root())
-                .env("CARGO_MANIFEST_DIR", root())
-                .env("OUT_DIR", &out),
-        )
-        .expect_success();
+        Outcome::of(&mut command).expect_success();
         best = best.min(start.elapsed());
         assert!(
             contents(&out) == built,
@@ -533,7 +557,7 @@ fn composing_everything_takes_at_most_3_seconds_and_repeats_byte_by_byte() {
         );
     }
     println!("composing everything: {best:.2?}");
-    assert!(best <= Duration::from_secs(3), "{best:.2?}");
+    assert!(best <= limit, "{best:.2?}");
 }
 
 #[test]

@@ -316,8 +316,8 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
 #endif
 #ifdef CLOUDS
 #ifndef LOW_QUALITY
-    let layer = CloudLayer(anchors.cloud_cell, anchors.cloud_frac, content.cloud_scale, content.cloud_period,
-        CLOUD_OCTAVES, 1.0, content.clouds_height, content.clouds_thickness, content.cloud_coverage, 0.0,
+    let layer = CloudLayer(anchors.cloud_cell, anchors.cloud_frac, content.cloud_scale, content.cloud_period, 1.0,
+        content.clouds_height, content.clouds_thickness, content.cloud_coverage, 0.0,
         content.cloud_density * (content.cloud_scattering + content.cloud_absorption),
         content.cloud_scattering / max(content.cloud_scattering + content.cloud_absorption, 1e-20),
         content.cloud_g_forward, content.cloud_g_backward, content.cloud_backward_share, content.cloud_seed);
