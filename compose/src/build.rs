@@ -361,6 +361,8 @@ impl Build {
                     continue;
                 }
             };
+            // veduta's own programs declare every override as a key; a user's need not.
+            composer.allow_any_override(!path.starts_with(&wgsl));
             let prepared = crate::sp::parse_bytes(&file, &bytes).and_then(|sp| {
                 let folder = path.parent().unwrap_or(Path::new(""));
                 watched.extend(sp.sources().into_iter().map(|source| folder.join(source)));

@@ -60,7 +60,8 @@ pub struct Composer {
     any_override: bool,
     require_headers: bool,
     read: Reader,
-    stages: BTreeMap<(String, StageKind, Defs), Rc<DoneStage>>,
+    /// By file, stage and values; with the text, as a file may come again with another one.
+    stages: BTreeMap<(String, StageKind, Defs), (String, Rc<DoneStage>)>,
     passed: BTreeSet<String>,
 }
 
@@ -73,6 +74,7 @@ pub struct Program {
     pub file: String,
     /// The flags and sizes that make a difference to it.
     pub relevant: BTreeSet<String>,
+    any_override: bool,
     stages: Vec<SourceStage>,
 }
 
@@ -182,11 +184,9 @@ impl Composer {
         self
     }
 
-    /// Lets programs declare overrides that are no keys.
-    #[must_use]
-    pub fn any_override(mut self, any: bool) -> Self {
+    /// Whether the programs that are prepared from now on may declare overrides that are no keys. Default: no.
+    pub fn allow_any_override(&mut self, any: bool) {
         self.any_override = any;
-        self
     }
 
     /// Whether every module must have headers in the grammar of `docs/modules.md`; else only those that start with `//!`.
@@ -285,6 +285,7 @@ impl Composer {
             name,
             file: sp.file().to_owned(),
             relevant,
+            any_override: self.any_override,
             stages,
         })
     }
@@ -339,28 +340,17 @@ impl Composer {
                 }
             }
         }
-        let roots: Vec<&str> = scan
+        let roots: Vec<String> = scan
             .imports()
             .map(|import| {
                 if library.is_plug_in(import) {
-                    // The path of the module is that of the whole import.
-                    import.item.as_str()
+                    import.path()
                 } else {
-                    import.module.as_str()
+                    import.module.clone()
                 }
             })
             .collect();
-        let plugged: Vec<String> = scan
-            .imports()
-            .filter(|import| library.is_plug_in(import))
-            .map(crate::scan::Import::path)
-            .collect();
-        let mut reached = library.reached(
-            roots
-                .iter()
-                .copied()
-                .chain(plugged.iter().map(String::as_str)),
-        );
+        let mut reached = library.reached(roots.iter().map(String::as_str));
         // A plug-in counts where the module that it changes is reached.
         let plug_ins: Vec<String> = self
             .plug_ins
@@ -582,13 +572,14 @@ impl Composer {
             .map(|(name, def)| (name.clone(), *def))
             .collect();
         let key = (program.file.clone(), stage.kind, defs);
-        // The same program may come again with another text, when it is reloaded at run time.
-        let key = (format!("{}\n{}", key.0, stage.stitched.text), key.1, key.2);
-        if let Some(done) = self.stages.get(&key) {
+        if let Some((text, done)) = self.stages.get(&key)
+            && *text == stage.stitched.text
+        {
             return Ok(done.clone());
         }
         let done = Rc::new(self.compose_stage(program, stage, &key.2)?);
-        self.stages.insert(key, done.clone());
+        self.stages
+            .insert(key, (stage.stitched.text.clone(), done.clone()));
         Ok(done)
     }
 
@@ -673,6 +664,10 @@ impl Composer {
                 push_new(&mut diags, stage.gate_diag(&fault, self.linker.library()));
             }
             if diags.is_empty() {
+                // More than any build has; a program that reloads for days must not grow.
+                if self.passed.len() >= 4096 {
+                    self.passed.clear();
+                }
                 self.passed.insert(finished.wgsl.clone());
             }
         }
@@ -684,7 +679,7 @@ impl Composer {
             }
         };
         for item in &mut tables.overrides {
-            self.check_override(item, stage, &mut diags);
+            self.check_override(item, program, stage, &mut diags);
         }
         diags.ok(DoneStage {
             wgsl: finished.wgsl,
@@ -694,7 +689,13 @@ impl Composer {
     }
 
     /// An override bears the name, type and default of a quality key.
-    fn check_override(&self, item: &mut Override, stage: &SourceStage, diags: &mut Diags) {
+    fn check_override(
+        &self,
+        item: &mut Override,
+        program: &Program,
+        stage: &SourceStage,
+        diags: &mut Diags,
+    ) {
         let name = item.name.clone();
         let mut push = |message: String, notes: Vec<String>| {
             let mut diag = stage.diag_of(Some(&name), &message);
@@ -702,7 +703,7 @@ impl Composer {
             push_new(diags, diag);
         };
         let Some(key) = self.keys.get(&item.name) else {
-            if !self.any_override {
+            if !program.any_override {
                 let overridable = self.keys.iter().filter(|key| {
                     key.kind == KeyKind::Quality
                         && matches!(key.ty, KeyType::I32 | KeyType::U32 | KeyType::F32)

@@ -342,7 +342,9 @@ impl File<'_> {
             }
         }
         self.line("/// The blocks of the composed programs: what a host puts into uniform and storage buffers.");
-        self.line("#[allow(dead_code, non_camel_case_types, non_snake_case, clippy::manual_memcpy)]");
+        self.line(
+            "#[allow(dead_code, non_camel_case_types, non_snake_case, clippy::manual_memcpy)]",
+        );
         self.line("pub mod blocks {");
         self.line(
             "    fn put(bytes: &mut [u8], at: usize, word: [u8; 4]) {\n        if let Some(place) = bytes.get_mut(at..at + 4) {\n            place.copy_from_slice(&word);\n        }\n    }\n",

@@ -667,6 +667,14 @@ pub fn check_modules(linker: &mut Linker, declared: &Declared) -> Diags {
             });
             if let Err(more) = outcome {
                 for mut diag in more.0 {
+                    // As an import the module has no text of its own for what concerns it as a whole.
+                    if diag.file == module.file
+                        && crate::diag::line_at(&module.text, diag.line) != diag.source_line
+                    {
+                        let notes = std::mem::take(&mut diag.notes);
+                        diag = Diag::whole_file(&module.file, diag.message);
+                        diag.notes = notes;
+                    }
                     if !defs.is_empty() {
                         let on: Vec<&str> = defs.keys().map(String::as_str).collect();
                         diag = diag.note(format!("with {} on", quoted(&on)));

@@ -653,6 +653,7 @@ impl Scan {
         }
         let mut stack: Vec<Open> = Vec::new();
         let mut next_id = 0;
+        let mut has_path = false;
         let mut faults = Vec::new();
         let mut fault = |at: usize, message: &str| {
             faults.push(Fault {
@@ -701,7 +702,15 @@ impl Scan {
                         import.scope = stack.iter().map(|open| (open.id, open.branch)).collect();
                     }
                 }
-                DirectiveKind::ImportPath { .. } | DirectiveKind::Faulty => {}
+                DirectiveKind::ImportPath { at, .. } => {
+                    if has_path {
+                        fault(*at, "a second `#define_import_path` in one file");
+                    } else if !stack.is_empty() {
+                        fault(*at, "`#define_import_path` must not depend on a condition");
+                    }
+                    has_path = true;
+                }
+                DirectiveKind::Faulty => {}
             }
         }
         for open in stack {
