@@ -477,9 +477,7 @@ impl Catalog {
             .collect();
         let composed = self.composer()?.compose(&sp, &features, &sizes)?;
         let mut composed = veduta::compose::program(&composed)?;
-        // Features that make no difference are asked for as well.
         composed.program = program.to_owned().into();
-        composed.features = features.into_iter().map(Into::into).collect();
         let programs = self.set.programs.to_mut();
         programs.retain(|p| p.program != composed.program || p.features != composed.features);
         programs.push(composed);

@@ -38,6 +38,8 @@ pub struct Composed {
     pub program: String,
     /// The features that are on, of those that make a difference; in alphabetical order.
     pub features: Vec<String>,
+    /// Every flag that the program or a module that it reaches mentions, on or off; in alphabetical order.
+    pub mentions: Vec<String>,
     /// The stages in pipeline order.
     pub stages: Vec<Stage>,
     /// The resources by group and binding, each with all stages that use it.
@@ -545,6 +547,11 @@ impl Composer {
         Ok(Composed {
             program: program.name.clone(),
             features: feature_names,
+            mentions: program
+                .relevant
+                .intersection(&self.declared.flags)
+                .cloned()
+                .collect(),
             stages: done
                 .iter()
                 .map(|(stage, outcome)| Stage {

@@ -107,6 +107,8 @@ impl File<'_> {
         let name = |what: &str| format!("P{index}_{what}");
         let features: Vec<String> = composed.features.iter().map(|f| text(f)).collect();
         self.list(&name("FEATURES"), &format!("{p}::Text"), &features);
+        let mentions: Vec<String> = composed.mentions.iter().map(|f| text(f)).collect();
+        self.list(&name("MENTIONS"), &format!("{p}::Text"), &mentions);
         let mut stages = Vec::new();
         for stage in &composed.stages {
             let kind = match stage.kind {
@@ -304,9 +306,10 @@ impl File<'_> {
             .enumerate()
             .map(|(index, (program, _))| {
                 format!(
-                    "{p}::ComposedProgram {{ program: {}, features: {}, stages: {}, bindings: {}, overrides: {}, structs: {} }}",
+                    "{p}::ComposedProgram {{ program: {}, features: {}, mentions: {}, stages: {}, bindings: {}, overrides: {}, structs: {} }}",
                     text(program),
                     borrowed(&format!("P{index}_FEATURES")),
+                    borrowed(&format!("P{index}_MENTIONS")),
                     borrowed(&format!("P{index}_STAGES")),
                     borrowed(&format!("P{index}_BINDINGS")),
                     borrowed(&format!("P{index}_OVERRIDES")),

@@ -1,7 +1,7 @@
 //! Fractal sums against their twins and their defining properties (rows L07 to L10).
 
-use crate::sweep::{POINTS, Truth, cell, check, float, floats, random_cell, random_frac};
 use crate::common::{Random, evaluator};
+use crate::sweep::{POINTS, Truth, cell, check, float, floats, random_cell, random_frac};
 use veduta::reference::fractal::*;
 use veduta::reference::noise::{gradient_noise_2d, octave_2d, octave_seed};
 
@@ -220,8 +220,7 @@ fn row_l07_fbm() {
     });
     assert!(s.low >= 0.0 && s.high <= 1.0, "{s:?}");
 
-    let arguments =
-        format!("{AT_3D}, vec3i(in.i[11], in.i[12], in.i[13]), in.f[8], in.u[6]");
+    let arguments = format!("{AT_3D}, vec3i(in.i[11], in.i[12], in.i[13]), in.f[8], in.u[6]");
     let name = of("fbm_value_3d_periodic_six");
     let s = check(&name, &arguments, 14, POINTS, periodic, |r| {
         let h = hurst::<3>(r);

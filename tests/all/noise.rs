@@ -1,7 +1,7 @@
 //! Lattices, value and gradient noise against their twins (rows L05, L06).
 
-use crate::sweep::{POINTS, Truth, cell, check, float, floats, random_cell, random_frac};
 use crate::common::{Random, evaluator};
+use crate::sweep::{POINTS, Truth, cell, check, float, floats, random_cell, random_frac};
 use veduta::reference::noise::*;
 
 const ONE_NOISE: f64 = 2e-6;
