@@ -129,7 +129,51 @@ fn times(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Hybrid multifractal in 2D and its gradient. Leitner 2022, alg. 2.
+/// A fractal's value with its gradient, and how near it is to a kink: the least distance of a weight from where it is cut
+/// off, or of a noise from where it is mirrored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kinked {
+    /// Value, d/dx, d/dy.
+    pub slope: [f64; 3],
+    /// Distance to the nearest kink, infinite if there is none.
+    pub kink: f64,
+}
+
+/// Hybrid multifractal in 2D with its gradient and its kinks. Leitner 2022, alg. 2.
+pub fn hybrid_multifractal_2d_kinked(
+    cell: [i32; 2],
+    frac: [f64; 2],
+    octaves: i32,
+    hurst: f64,
+    offset: f64,
+    seed: u32,
+) -> Kinked {
+    let signal = |i: i32| {
+        let [n, dx, dy] = octave_noise_2d(cell, frac, i, seed);
+        [n + offset, dx, dy].map(|v| octave_amplitude(i, hurst) * v)
+    };
+    let mut kink = f64::INFINITY;
+    if octaves < 1 {
+        let slope = [0.0; 3];
+        return Kinked { slope, kink };
+    }
+    let mut result = signal(0);
+    let mut weight = result;
+    for i in 1..octaves {
+        kink = kink.min((weight[0] - 1.0).abs());
+        if weight[0] > 1.0 {
+            weight = [1.0, 0.0, 0.0];
+        }
+        weight = times(weight, signal(i));
+        result = std::array::from_fn(|k| result[k] + weight[k]);
+    }
+    Kinked {
+        slope: result,
+        kink,
+    }
+}
+
+/// Hybrid multifractal in 2D and its gradient.
 pub fn hybrid_multifractal_2d_slope(
     cell: [i32; 2],
     frac: [f64; 2],
@@ -138,23 +182,7 @@ pub fn hybrid_multifractal_2d_slope(
     offset: f64,
     seed: u32,
 ) -> [f64; 3] {
-    let signal = |i: i32| {
-        let [n, dx, dy] = octave_noise_2d(cell, frac, i, seed);
-        [n + offset, dx, dy].map(|v| octave_amplitude(i, hurst) * v)
-    };
-    if octaves < 1 {
-        return [0.0; 3];
-    }
-    let mut result = signal(0);
-    let mut weight = result;
-    for i in 1..octaves {
-        if weight[0] > 1.0 {
-            weight = [1.0, 0.0, 0.0];
-        }
-        weight = times(weight, signal(i));
-        result = std::array::from_fn(|k| result[k] + weight[k]);
-    }
-    result
+    hybrid_multifractal_2d_kinked(cell, frac, octaves, hurst, offset, seed).slope
 }
 
 /// Hybrid multifractal in 2D.
@@ -174,12 +202,19 @@ pub fn smooth_abs(n: f64, smoothness: f64) -> f64 {
     (n * n + smoothness.max(0.0)).sqrt()
 }
 
-/// 1 - |n| of octave i, smoothed, with its gradient.
-fn ridge(cell: [i32; 2], frac: [f64; 2], i: i32, smoothness: f64, seed: u32) -> [f64; 3] {
+/// 1 - |n| of octave i, smoothed, with its gradient; and how near it is to a kink.
+fn ridge(cell: [i32; 2], frac: [f64; 2], i: i32, smoothness: f64, seed: u32) -> Kinked {
     let [n, dx, dy] = octave_noise_2d(cell, frac, i, seed);
     let size = smooth_abs(n, smoothness);
     let change = if size > 0.0 { n / size } else { 0.0 };
-    [1.0 - size, -change * dx, -change * dy]
+    Kinked {
+        slope: [1.0 - size, -change * dx, -change * dy],
+        kink: if smoothness > 0.0 {
+            f64::INFINITY
+        } else {
+            size
+        },
+    }
 }
 
 fn clamped_weight(signal: [f64; 3], gain: f64) -> [f64; 3] {
@@ -193,7 +228,44 @@ fn clamped_weight(signal: [f64; 3], gain: f64) -> [f64; 3] {
     }
 }
 
-/// Ridged multifractal in 2D and its gradient, squared in every octave. Leitner 2022, alg. 3, corrected.
+/// Ridged multifractal in 2D with its gradient and its kinks, squared in every octave. Leitner 2022, alg. 3, corrected.
+#[allow(clippy::too_many_arguments)]
+pub fn ridged_multifractal_2d_kinked(
+    cell: [i32; 2],
+    frac: [f64; 2],
+    octaves: i32,
+    hurst: f64,
+    gain: f64,
+    smoothness: f64,
+    seed: u32,
+) -> Kinked {
+    let mut kink = f64::INFINITY;
+    let mut square = |i: i32| {
+        let r = ridge(cell, frac, i, smoothness, seed);
+        kink = kink.min(r.kink);
+        times(r.slope, r.slope)
+    };
+    if octaves < 1 {
+        let slope = [0.0; 3];
+        return Kinked { slope, kink };
+    }
+    let mut signal = square(0);
+    let mut result = signal;
+    let mut cut = f64::INFINITY;
+    for i in 1..octaves {
+        cut = cut.min((signal[0] * gain - 1.0).abs());
+        let weight = clamped_weight(signal, gain);
+        signal = times(square(i), weight);
+        let a = octave_amplitude(i, hurst);
+        result = std::array::from_fn(|k| result[k] + a * signal[k]);
+    }
+    Kinked {
+        slope: result,
+        kink: kink.min(cut),
+    }
+}
+
+/// Ridged multifractal in 2D and its gradient.
 #[allow(clippy::too_many_arguments)]
 pub fn ridged_multifractal_2d_slope(
     cell: [i32; 2],
@@ -204,22 +276,7 @@ pub fn ridged_multifractal_2d_slope(
     smoothness: f64,
     seed: u32,
 ) -> [f64; 3] {
-    let square = |i: i32| {
-        let r = ridge(cell, frac, i, smoothness, seed);
-        times(r, r)
-    };
-    if octaves < 1 {
-        return [0.0; 3];
-    }
-    let mut signal = square(0);
-    let mut result = signal;
-    for i in 1..octaves {
-        let weight = clamped_weight(signal, gain);
-        signal = times(square(i), weight);
-        let a = octave_amplitude(i, hurst);
-        result = std::array::from_fn(|k| result[k] + a * signal[k]);
-    }
-    result
+    ridged_multifractal_2d_kinked(cell, frac, octaves, hurst, gain, smoothness, seed).slope
 }
 
 /// Ridged multifractal in 2D.
@@ -250,12 +307,12 @@ pub fn ridged_multifractal_printed_2d(
     if octaves < 1 {
         return 0.0;
     }
-    let first = ridge(cell, frac, 0, smoothness, seed)[0];
+    let first = ridge(cell, frac, 0, smoothness, seed).slope[0];
     let mut signal = first * first;
     let mut result = signal;
     for i in 1..octaves {
         let weight = (signal * gain).clamp(0.0, 1.0);
-        signal = ridge(cell, frac, i, smoothness, seed)[0] * weight;
+        signal = ridge(cell, frac, i, smoothness, seed).slope[0] * weight;
         result += octave_amplitude(i, hurst) * signal;
     }
     result

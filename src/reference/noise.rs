@@ -174,22 +174,28 @@ pub fn value_noise_3d_periodic(cell: [i32; 3], frac: [f64; 3], period: [i32; 3],
     value
 }
 
-/// The gradient at a lattice point in 2D: length sqrt(2), an angle of 23 bits in the first quadrant, two signs.
+/// The gradient at a lattice point in 2D: length sqrt(2), an angle of 23 bits in the first octant, a swap of the
+/// components, two signs.
 pub fn lattice_gradient_2d(cell: [i32; 2], seed: u32) -> [f64; 2] {
     let word = lattice_hash_2d(cell, seed)[0];
-    let angle = std::f64::consts::FRAC_PI_2 * f64::from(word >> 9) / f64::from(1_u32 << 23);
+    let angle = std::f64::consts::FRAC_PI_4 * f64::from(word >> 9) / f64::from(1_u32 << 23);
     let (sine, cosine) = angle.sin_cos();
     let sign = |bit: u32| if word >> bit & 1 == 1 { -1.0 } else { 1.0 };
+    let [x, y] = if word >> 2 & 1 == 1 {
+        [sine, cosine]
+    } else {
+        [cosine, sine]
+    };
     let length = std::f64::consts::SQRT_2;
-    [length * sign(0) * cosine, length * sign(1) * sine]
+    [length * sign(0) * x, length * sign(1) * y]
 }
 
-/// The gradient at a lattice point in 3D: length 2/sqrt(3), one of the 24 vectors (0, +-a, +-b) and permutations with
+/// The gradient at a lattice point in 3D: length 1.3847, one of the 24 vectors (0, +-a, +-b) and permutations with
 /// a/b the golden ratio or its inverse.
 pub fn lattice_gradient_3d(cell: [i32; 3], seed: u32) -> [f64; 3] {
     let word = lattice_hash_3d(cell, seed)[0];
     let golden = (1.0 + 5_f64.sqrt()) / 2.0;
-    let length = 2.0 / 3_f64.sqrt();
+    let length = 1.3847;
     let long = length * golden / (1.0 + golden * golden).sqrt();
     let short = length / (1.0 + golden * golden).sqrt();
     let sign = |bit: u32| if word >> bit & 1 == 1 { -1.0 } else { 1.0 };

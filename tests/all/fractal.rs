@@ -1,7 +1,9 @@
 //! Fractal sums against their twins and their defining properties (rows L07 to L10).
 
 use crate::common::{Random, evaluator};
-use crate::sweep::{POINTS, Truth, cell, check, float, floats, random_cell, random_frac};
+use crate::sweep::{
+    POINTS, Truth, cell, check, check_all, float, floats, random_cell, random_frac,
+};
 use veduta::reference::fractal::*;
 use veduta::reference::noise::{gradient_noise_2d, octave_2d, octave_seed};
 
@@ -20,13 +22,11 @@ fn fill<const N: usize>(random: &mut Random, row: &mut [u32]) {
         row[N + axis] = random_frac(random);
     }
     row[2 * N] = random.bits() as u32 >> (random.bits() & 31);
-    // The hardest case often enough: 16 octaves of the same amplitude.
-    let hard = random.bits() % 32 == 0;
-    row[2 * N + 1] = if hard {
-        16
-    } else {
-        1 + random.bits() as u32 % 16
-    };
+    // Few octaves more often than many; the hardest case, 16 octaves of the same amplitude, often enough.
+    let hard = random.bits().is_multiple_of(64);
+    let bits = random.bits();
+    let few = (bits & 15).min(bits >> 8 & 15) as u32;
+    row[2 * N + 1] = if hard { 16 } else { 1 + few };
     row[2 * N + 2] = if hard { 0.0 } else { random.between(0.0, 2.0) }.to_bits();
     row[2 * N + 3] = random.unit().to_bits();
     row[2 * N + 4] = random.unit().to_bits();
@@ -145,44 +145,15 @@ fn row_l07_fbm() {
     let flat = format!("{AT_2D}, in.i[5], in.f[6], in.u[4]");
     let solid = format!("{AT_3D}, in.i[7], in.f[8], in.u[6]");
     // The twins are the explicit octave sums of algorithm 1.
-    check(&of("fbm_2d"), &flat, 9, POINTS, fill::<2>, |r| {
-        let v = fbm_2d(
-            cell(r),
-            floats(&r[2..]),
-            octaves::<2>(r),
-            hurst::<2>(r),
-            r[4],
-        );
-        truth::<2, 1>(r, [v], false)
-    });
-    check(&of("fbm_2d_slope"), &flat, 9, POINTS, fill::<2>, |r| {
-        let v = fbm_2d_slope(
-            cell(r),
-            floats(&r[2..]),
-            octaves::<2>(r),
-            hurst::<2>(r),
-            r[4],
-        );
+    let both = |name: &str| [of(name), of(&format!("{name}_slope"))];
+    check_all(&both("fbm_2d"), &flat, 9, POINTS, fill::<2>, |r| {
+        let (n, h) = (octaves::<2>(r), hurst::<2>(r));
+        let v = fbm_2d_slope(cell(r), floats(&r[2..]), n, h, r[4]);
         truth::<2, 3>(r, v, false)
     });
-    check(&of("fbm_3d"), &solid, 11, POINTS, fill::<3>, |r| {
-        let v = fbm_3d(
-            cell(r),
-            floats(&r[3..]),
-            octaves::<3>(r),
-            hurst::<3>(r),
-            r[6],
-        );
-        truth::<3, 1>(r, [v], false)
-    });
-    check(&of("fbm_3d_slope"), &solid, 11, POINTS, fill::<3>, |r| {
-        let v = fbm_3d_slope(
-            cell(r),
-            floats(&r[3..]),
-            octaves::<3>(r),
-            hurst::<3>(r),
-            r[6],
-        );
+    check_all(&both("fbm_3d"), &solid, 11, POINTS, fill::<3>, |r| {
+        let (n, h) = (octaves::<3>(r), hurst::<3>(r));
+        let v = fbm_3d_slope(cell(r), floats(&r[3..]), n, h, r[6]);
         truth::<3, 4>(r, v, false)
     });
     // Normalised: the bar of the sum divided by the sum of the amplitudes.
@@ -225,7 +196,7 @@ fn row_l07_fbm() {
     let s = check(&name, &arguments, 14, POINTS, periodic, |r| {
         let h = hurst::<3>(r);
         let v = fbm_value_3d_periodic(cell(r), floats(&r[3..]), cell(&r[11..]), 6, h, r[6]);
-        normalised(r, v)
+        normalised(&[&r[..7], &[6], &r[8..]].concat(), v)
     });
     assert!(s.low >= 0.0 && s.high <= 1.0, "{s:?}");
 
@@ -310,34 +281,16 @@ fn row_l08_hybrid() {
     let prefix = "veduta::fractal::hybrid::";
     let of = |name: &str| format!("{prefix}{name}");
     let arguments = format!("{AT_2D}, in.i[5], in.f[6], in.f[7], in.u[4]");
-    check(
-        &of("hybrid_multifractal_2d"),
-        &arguments,
-        9,
-        POINTS,
-        fill::<2>,
-        |r| {
-            let (n, h, offset) = (octaves::<2>(r), hurst::<2>(r), float(r[7]));
-            let v = hybrid_multifractal_2d(cell(r), floats(&r[2..]), n, h, offset, r[4]);
-            truth::<2, 1>(r, [v], false)
-        },
-    );
-    let s = check(
-        &of("hybrid_multifractal_2d_slope"),
-        &arguments,
-        9,
-        POINTS,
-        fill::<2>,
-        |r| {
-            let (n, h, offset) = (octaves::<2>(r), hurst::<2>(r), float(r[7]));
-            let v = hybrid_multifractal_2d_slope(cell(r), floats(&r[2..]), n, h, offset, r[4]);
-            let kink = hybrid_weights(r, offset)
-                .iter()
-                .any(|[kept, _]| (kept - 1.0).abs() < KINK);
-            truth::<2, 3>(r, v, kink)
-        },
-    );
-    assert!(s.kinks < s.rows / 1000, "{s:?}");
+    let both = [
+        of("hybrid_multifractal_2d"),
+        of("hybrid_multifractal_2d_slope"),
+    ];
+    let found = check_all(&both, &arguments, 9, POINTS, fill::<2>, |r| {
+        let (n, h, offset) = (octaves::<2>(r), hurst::<2>(r), float(r[7]));
+        let v = hybrid_multifractal_2d_kinked(cell(r), floats(&r[2..]), n, h, offset, r[4]);
+        truth::<2, 3>(r, v.slope, v.kink < KINK)
+    });
+    assert!(found[1].kinks < POINTS / 1000, "{found:?}");
 
     // With offset 1 the weights would pass 1 without the cut; with it no octave adds more than its amplitude times
     // (1 + offset).
@@ -399,46 +352,21 @@ fn ridged_parameters(row: &[u32]) -> (f64, f64) {
     (4.0 * float(row[7]), if k > 0.5 { k } else { 0.0 })
 }
 
-fn ridged_kink(row: &[u32]) -> bool {
-    let (gain, k) = ridged_parameters(row);
-    let mut weight = 1.0;
-    noises(row).into_iter().any(|n| {
-        let signal = (1.0 - smooth_abs(n, k)).powi(2) * weight;
-        weight = (signal * gain).clamp(0.0, 1.0);
-        (k == 0.0 && n.abs() < KINK) || (signal * gain - 1.0).abs() < KINK
-    })
-}
-
 #[test]
 fn row_l09_ridged() {
     let prefix = "veduta::fractal::ridged::";
     let of = |name: &str| format!("{prefix}{name}");
     let arguments = format!("{AT_2D}, {RIDGED}");
-    check(
-        &of("ridged_multifractal_2d"),
-        &arguments,
-        9,
-        POINTS,
-        fill::<2>,
-        |r| {
-            let (n, h, (gain, k)) = (octaves::<2>(r), hurst::<2>(r), ridged_parameters(r));
-            let v = ridged_multifractal_2d(cell(r), floats(&r[2..]), n, h, gain, k, r[4]);
-            truth::<2, 1>(r, [v], false)
-        },
-    );
-    let s = check(
-        &of("ridged_multifractal_2d_slope"),
-        &arguments,
-        9,
-        POINTS,
-        fill::<2>,
-        |r| {
-            let (n, h, (gain, k)) = (octaves::<2>(r), hurst::<2>(r), ridged_parameters(r));
-            let v = ridged_multifractal_2d_slope(cell(r), floats(&r[2..]), n, h, gain, k, r[4]);
-            truth::<2, 3>(r, v, ridged_kink(r))
-        },
-    );
-    assert!(s.kinks < s.rows / 100, "{s:?}");
+    let both = [
+        of("ridged_multifractal_2d"),
+        of("ridged_multifractal_2d_slope"),
+    ];
+    let found = check_all(&both, &arguments, 9, POINTS, fill::<2>, |r| {
+        let (n, h, (gain, k)) = (octaves::<2>(r), hurst::<2>(r), ridged_parameters(r));
+        let v = ridged_multifractal_2d_kinked(cell(r), floats(&r[2..]), n, h, gain, k, r[4]);
+        truth::<2, 3>(r, v.slope, v.kink < KINK)
+    });
+    assert!(found[1].kinks < POINTS / 1000, "{found:?}");
     check(
         &of("ridged_multifractal_printed_2d"),
         &arguments,

@@ -1,7 +1,9 @@
 //! Lattices, value and gradient noise against their twins (rows L05, L06).
 
 use crate::common::{Random, evaluator};
-use crate::sweep::{POINTS, Truth, cell, check, float, floats, random_cell, random_frac};
+use crate::sweep::{
+    POINTS, Truth, cell, check, check_all, float, floats, random_cell, random_frac,
+};
 use veduta::reference::noise::*;
 
 const ONE_NOISE: f64 = 2e-6;
@@ -91,41 +93,42 @@ fn lattice_positions_on_the_device_equal_their_twins() {
         fill::<3>(&mut random, row);
         row[7] = random.bits() as u32 % 22;
     }
-    // The place as one number: cells compared exactly, fractions to one rounding; a fraction rounded up to a whole
-    // cell counts as that cell.
-    let check =
-        |name: &str, arguments: &str, twin: &dyn Fn(&[u32]) -> ([i32; 3], [f64; 3]), bound: f64| {
-            let import = format!("veduta::noise::lattice::{name}");
-            let run = |member: &str, kind: &str| {
-                let expression = if name.ends_with("2d") {
-                    format!("vec3<{kind}>({name}({arguments}).{member}, {kind}(0))")
-                } else {
-                    format!("{name}({arguments}).{member}")
-                };
-                evaluator(&[&import], "", &expression, columns)
-                    .run_bits(&rows)
-                    .unwrap()
-            };
-            let (cells, fracs) = (run("cell", "i32"), run("frac", "f32"));
-            let mut worst = 0.0_f64;
-            for ((row, c), f) in rows
-                .chunks(columns)
-                .zip(cells.chunks(3))
-                .zip(fracs.chunks(3))
-            {
-                let (cell, frac) = twin(row);
-                for axis in 0..3 {
-                    let whole = c[axis]
-                        .wrapping_sub(cell[axis].cast_unsigned())
-                        .cast_signed();
-                    let got = float(f[axis]);
-                    assert!((0.0..=1.0).contains(&got), "{name} {row:?}: {got}");
-                    worst = worst.max((f64::from(whole) + got - frac[axis]).abs());
-                }
+    // The place as one number, axis by axis: a fraction rounded up to a whole cell counts as that cell.
+    let check = |name: &str,
+                 arguments: &str,
+                 twin: &dyn Fn(&[u32]) -> ([i32; 3], [f64; 3]),
+                 bound: f64| {
+        let import = format!("veduta::noise::lattice::{name}");
+        let mut worst = 0.0_f64;
+        for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
+            if axis == 2 && name.ends_with("2d") {
+                continue;
             }
-            println!("veduta::noise::lattice::{name}: error {worst:.2e}");
-            assert!(worst <= bound, "{name}: {worst}");
-        };
+            let prelude = format!(
+                "fn place(p: Lattice{}) -> vec2u {{ return vec2u(bitcast<u32>(p.cell.{letter}), bitcast<u32>(p.frac.{letter})); }}",
+                &name[name.len() - 2..]
+            );
+            let structure = format!("veduta::noise::lattice::Lattice{}", &name[name.len() - 2..]);
+            let device = evaluator(
+                &[&import, &structure],
+                &prelude,
+                &format!("place({name}({arguments}))"),
+                columns,
+            );
+            let found = device.run_bits(&rows).unwrap();
+            for (row, found) in rows.chunks(columns).zip(found.chunks(2)) {
+                let (cell, frac) = twin(row);
+                let whole = found[0]
+                    .wrapping_sub(cell[axis].cast_unsigned())
+                    .cast_signed();
+                let got = float(found[1]);
+                assert!((0.0..=1.0).contains(&got), "{name} {row:?}: {got}");
+                worst = worst.max((f64::from(whole) + got - frac[axis]).abs());
+            }
+        }
+        println!("veduta::noise::lattice::{name}: error {worst:.2e}");
+        assert!(worst <= bound, "{name}: {worst}");
+    };
     let split2 = |row: &[u32]| {
         let p = split_2d(cell(row), floats(&row[3..]).map(|f: f64| 100.0 * f - 50.0));
         ([p.cell[0], p.cell[1], 0], [p.frac[0], p.frac[1], 0.0])
@@ -301,38 +304,27 @@ fn row_l05_value_noise() {
         assert!(s.low >= 0.0 && s.high <= 1.0, "{s:?}");
         assert!(s.low < 0.001 && s.high > 0.999, "{s:?}");
     };
-    near_ends(check(
-        &of("value_noise_2d"),
-        ARGS_2D,
-        5,
-        POINTS,
-        fill::<2>,
-        |r| truth([value_noise_2d(cell(r), floats(&r[2..]), r[4])]),
-    ));
-    near_ends(check(
-        &of("value_noise_3d"),
-        ARGS_3D,
-        7,
-        POINTS,
-        fill::<3>,
-        |r| truth([value_noise_3d(cell(r), floats(&r[3..]), r[6])]),
-    ));
-    check(
-        &of("value_noise_2d_slope"),
+    let both = |name: &str| [of(name), of(&format!("{name}_slope"))];
+    for s in check_all(
+        &both("value_noise_2d"),
         ARGS_2D,
         5,
         POINTS,
         fill::<2>,
         |r| truth(value_noise_2d_slope(cell(r), floats(&r[2..]), r[4])),
-    );
-    check(
-        &of("value_noise_3d_slope"),
+    ) {
+        near_ends(s);
+    }
+    for s in check_all(
+        &both("value_noise_3d"),
         ARGS_3D,
         7,
         POINTS,
         fill::<3>,
         |r| truth(value_noise_3d_slope(cell(r), floats(&r[3..]), r[6])),
-    );
+    ) {
+        near_ends(s);
+    }
     // Periods from 1 to 2^30, small ones as often as large ones.
     let periodic = |random: &mut Random, row: &mut [u32]| {
         fill::<3>(random, row);
@@ -412,42 +404,31 @@ fn row_l05_value_noise() {
 fn row_l06_gradient_noise() {
     let prefix = "veduta::noise::gradient::";
     let of = |name: &str| format!("{prefix}{name}");
+    let both = |name: &str| [of(name), of(&format!("{name}_slope"))];
     let inside = |s: crate::sweep::Summary| {
         assert!(s.low >= -1.0 && s.high <= 1.0, "{s:?}");
         assert!(s.low < -0.9 && s.high > 0.9, "{s:?}");
     };
-    inside(check(
-        &of("gradient_noise_2d"),
-        ARGS_2D,
-        5,
-        POINTS,
-        fill::<2>,
-        |r| truth([gradient_noise_2d(cell(r), floats(&r[2..]), r[4])]),
-    ));
-    inside(check(
-        &of("gradient_noise_3d"),
-        ARGS_3D,
-        7,
-        POINTS,
-        fill::<3>,
-        |r| truth([gradient_noise_3d(cell(r), floats(&r[3..]), r[6])]),
-    ));
-    inside(check(
-        &of("gradient_noise_2d_slope"),
+    for s in check_all(
+        &both("gradient_noise_2d"),
         ARGS_2D,
         5,
         POINTS,
         fill::<2>,
         |r| truth(gradient_noise_2d_slope(cell(r), floats(&r[2..]), r[4])),
-    ));
-    inside(check(
-        &of("gradient_noise_3d_slope"),
+    ) {
+        inside(s);
+    }
+    for s in check_all(
+        &both("gradient_noise_3d"),
         ARGS_3D,
         7,
         POINTS,
         fill::<3>,
         |r| truth(gradient_noise_3d_slope(cell(r), floats(&r[3..]), r[6])),
-    ));
+    ) {
+        inside(s);
+    }
     check(
         &of("lattice_gradient_2d"),
         "vec2i(in.i[0], in.i[1]), in.u[4]",
@@ -496,33 +477,69 @@ fn row_l06_gradient_noise() {
 
 #[test]
 fn no_noise_leaves_its_range() {
-    // The noise is at most the sum of weight times distance to the corner, if all gradients point at the sample.
-    // Scaled by sqrt(2) or 2 / sqrt(3), it reaches 1 in the middle of the cell and nowhere more.
-    let n = 400;
-    let mut worst = [0.0_f64; 2];
+    // The largest noise at a place: each corner's vector is the one that points at the place best.
+    // In 2D that is any direction, in 3D (0, a, b) with the larger side along the longer component.
+    let golden = (1.0 + 5_f64.sqrt()) / 2.0;
+    let norm = golden.hypot(1.0);
+    let best = |mut d: [f64; 3], dimensions: usize| {
+        if dimensions == 2 {
+            return std::f64::consts::SQRT_2 * d[0].hypot(d[1]);
+        }
+        d = d.map(f64::abs);
+        d.sort_by(f64::total_cmp);
+        1.3847 * (golden * d[2] + d[1]) / norm
+    };
+    let largest = |t: [f64; 3], dimensions: usize| {
+        (0..1 << dimensions)
+            .map(|corner| {
+                let mut weight = 1.0;
+                let d: [f64; 3] = std::array::from_fn(|axis| {
+                    let far = f64::from(u8::from(axis < dimensions && corner >> axis & 1 == 1));
+                    if axis < dimensions {
+                        weight *= far * fade(t[axis]) + (1.0 - far) * (1.0 - fade(t[axis]));
+                    }
+                    t[axis] - far
+                });
+                weight * best(d, dimensions)
+            })
+            .sum::<f64>()
+    };
+    let n = 200;
+    let mut worst = [(0.0_f64, [0.0; 3]); 2];
     for a in 0..=n {
         for b in 0..=n {
-            for c in [0, 50, 100, 150, 190, 200] {
+            for c in (0..=n / 2).step_by(5) {
                 let t = [a, b, c].map(|k| f64::from(k) / f64::from(n));
-                for (dimensions, worst) in [2, 3].into_iter().zip(&mut worst) {
-                    let mut sum = 0.0;
-                    for corner in 0..1 << dimensions {
-                        let (mut weight, mut square) = (1.0, 0.0);
-                        for (axis, &t) in t.iter().enumerate().take(dimensions) {
-                            let far = corner >> axis & 1 == 1;
-                            weight *= if far { fade(t) } else { 1.0 - fade(t) };
-                            square += if far { (1.0 - t) * (1.0 - t) } else { t * t };
-                        }
-                        sum += weight * f64::sqrt(square);
+                for (k, worst) in worst.iter_mut().enumerate() {
+                    let found = largest(t, k + 2);
+                    if found > worst.0 {
+                        *worst = (found, t);
                     }
-                    let length = 2.0 / f64::sqrt(dimensions as f64);
-                    *worst = worst.max(length * sum);
                 }
             }
         }
     }
-    for bound in worst {
-        assert!((bound - 1.0).abs() < 1e-12, "{bound}");
+    // Then uphill in halving steps.
+    for (k, (found, t)) in worst.iter_mut().enumerate() {
+        let mut step = 0.01;
+        while step > 1e-9 {
+            let mut better = false;
+            for axis in 0..3 {
+                for side in [-step, step] {
+                    let mut next = *t;
+                    next[axis] += side;
+                    if largest(next, k + 2) > *found {
+                        (*found, *t) = (largest(next, k + 2), next);
+                        better = true;
+                    }
+                }
+            }
+            if !better {
+                step /= 2.0;
+            }
+        }
+        println!("{}D: at most {found} at {t:?}", k + 2);
+        assert!(*found <= 1.0 + 1e-12 && *found > 0.9999, "{found}");
     }
 }
 
@@ -565,7 +582,7 @@ fn gradients_are_spread_evenly() {
     let mut random = Random(17);
     for _ in 0..100 {
         let d: [f64; 3] = std::array::from_fn(|_| f64::from(random.unit()) - 0.5);
-        let norm = d.iter().map(|c| c * c).sum::<f64>().sqrt() * 2.0 / 3_f64.sqrt();
+        let norm = d.iter().map(|c| c * c).sum::<f64>().sqrt() * 1.3847;
         let mean = |power: i32| {
             let products = seen
                 .iter()

@@ -3,9 +3,9 @@
 //! The vector hashes follow the idea of Jarzynski and Olano's pcg2d, pcg3d and pcg4d: one step of a linear congruential
 //! generator a word, then rounds in which words take up one another. They depart from the printed forms, because these
 //! fail as lattice hashes. In pcg2d the rounds before the shift are linear: over a 4096 x 4096 block the first word of
-//! cells 16 apart is correlated (64 standard deviations). In pcg3d and pcg4d the low bits are periodic with short periods,
-//! and in the slices where a factor is 0 just 99.756 % of a word's values are distinct instead of 99.805 %. Here what a
-//! word takes up is xor-shifted and multiplied first, so that high bits reach the low ones in every round. Every step is
+//! cells 16 apart is correlated (64 standard deviations). In pcg3d (pcg4d is built alike) the low bits are periodic with
+//! short periods, and in the slices where a factor is 0 just 99.756 % of a word's values are distinct instead of 99.805 %.
+//! Here what a word takes up is xor-shifted and multiplied first, so that high bits reach the low ones in every round. Every step is
 //! invertible: it adds to one word a function of the others, shifts-and-xors it, or multiplies it by an odd number made
 //! of the others; so each hash is a bijection of its vector.
 //!

@@ -1,12 +1,13 @@
 //! Gradient (Perlin) noise: random unit vectors at the lattice points, joined by the quintic fade.
 //!
-//! With weights that sum to 1, |noise| is at most the root of the weighted mean of the squared distances to the corners,
-//! which is largest in the middle of the cell: sqrt(n)/2 in n dimensions. The unit vectors are scaled by the inverse,
-//! sqrt(2) in 2D and 2/sqrt(3) in 3D, so that the noise lies in [-1, 1] and could reach its ends in 2D.
+//! The vectors are scaled so that the noise just fits in [-1, 1]. The largest noise is that of vectors which all point at
+//! the sample: in 2D the weighted mean distance to the corners, largest in the middle of the cell, 1/sqrt(2), so that the
+//! scale is sqrt(2); in 3D, with the directions there are, 0.72216 (the bound of any unit vectors is sqrt(3)/2), so that
+//! the scale is 1.3847.
 //!
-//! 2D directions are uniform on the circle: 23 bits of the hash are an angle within a quadrant, two more the signs. The
-//! sine and cosine are polynomials of ours; about the middle of the quadrant they serve both components, and the factor
-//! sqrt(2) is part of the rotation by 45 degrees. 3D directions are the 24 vertices of the two icosahedra with axes along
+//! 2D directions are uniform on the circle: 23 bits of the hash are an angle within an octant, three more choose the
+//! octant. The sine and cosine are polynomials of ours, because WGSL promises only 2^-11 for its own.
+//! 3D directions are the 24 vertices of the two icosahedra with axes along
 //! the lattice's: vectors (0, +-a, +-b) and their permutations with a/b the golden ratio, a spherical 5-design. (The usual
 //! twelve edge centres are a 3-design: noise along the diagonals differs from noise along the axes.)
 //!
@@ -18,37 +19,38 @@
 #import veduta::noise::lattice::{Lattice2d, Lattice3d, split_2d, split_3d, fade_2d, fade_3d, fade_slope_2d, fade_slope_3d}
 
 const SIGN: u32 = 2147483648u;
-// The icosahedron's two coordinates times 2/sqrt(3).
-const LONG_SIDE: f32 = 0.98224694637684602;
-const SHORT_SIDE: f32 = 0.60706199820668622;
+// The icosahedron's two coordinates times 1.3847.
+const LONG_SIDE: f32 = 1.177896174325070;
+const SHORT_SIDE: f32 = 0.727979870951364;
 
 /// The vector at a lattice point in 2D: a random direction, length sqrt(2).
 ///
-/// With x in [-pi/4, pi/4] the angle from the middle of the quadrant, sqrt(2) (cos(pi/4 + x), sin(pi/4 + x)) is
-/// (cos x - sin x, cos x + sin x). Minimax polynomials in x / (pi/2), error 3e-8.
+/// Minimax polynomials of sqrt(2) cos and sqrt(2) sin over an octant, in u = angle / (pi/4). Each ends with the sum of a
+/// large exact term and a small one, so that there is one rounding of the vector's size.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-1.4142136, 1.4142136] 1
-/// error   3e-7 abs of reference::noise::lattice_gradient_2d
+/// error   1.5e-7 abs of reference::noise::lattice_gradient_2d
 /// source  Leitner2022 3.7
 fn lattice_gradient_2d(cell: vec2<i32>, seed: u32) -> vec2<f32> {
     let h = lattice_hash_2d(cell, seed).x;
-    let u = bitcast<f32>((h >> 9u) | 0x3f800000u) - 1.5;
+    let u = bitcast<f32>((h >> 9u) | 0x3f800000u) - 1.0;
     let q = u * u;
-    let sine = u * (q * (q * (q * -0.00460214921281 + 0.0796802176478) - 0.645963477665) + 1.57079632195);
-    let cosine = q * (q * (q * -0.020408158393 + 0.253598571303) - 1.23369700742) + 0.999999972328;
+    let long = 1.4140625 + (q * (q * (q * -0.000450960849726 + 0.0224151586834) - 0.436177759939) + 0.00015102324);
+    let short = u + u * (q * (q * (q * -5.0847045569e-5 + 0.00352140138907) - 0.114191288864) + 0.110720731116);
+    let swap = (h & 4u) != 0u;
     return vec2<f32>(
-        bitcast<f32>(bitcast<u32>(cosine - sine) ^ (h << 31u)),
-        bitcast<f32>(bitcast<u32>(cosine + sine) ^ ((h << 30u) & SIGN)),
+        bitcast<f32>(bitcast<u32>(select(long, short, swap)) ^ (h << 31u)),
+        bitcast<f32>(bitcast<u32>(select(short, long, swap)) ^ ((h << 30u) & SIGN)),
     );
 }
 
-/// The vector at a lattice point in 3D: one of 24 directions, length 2/sqrt(3).
+/// The vector at a lattice point in 3D: one of 24 directions, length 1.3847.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
-/// range   [-0.98225, 0.98225] 1
+/// range   [-1.178, 1.178] 1
 /// error   6e-8 abs of reference::noise::lattice_gradient_3d
 /// source  Leitner2022 3.7; departs: 24 directions
 fn lattice_gradient_3d(cell: vec3<i32>, seed: u32) -> vec3<f32> {
