@@ -2,9 +2,7 @@
 //!
 //! A user's whole build script:
 //! ```no_run
-//! fn main() {
-//!     veduta_compose::Build::new().modules("shaders").programs("shaders").preset("thesis_low").write();
-//! }
+//! veduta_compose::Build::new().modules("shaders").programs("shaders").preset("thesis_low").write();
 //! ```
 //! and in the program `mod shaders { include!(concat!(env!("OUT_DIR"), "/veduta_programs.rs")); }`.
 

@@ -387,21 +387,21 @@ impl Composer {
     /// What concerns more than one stage.
     fn lint_program(&self, sp: &SpFile, stages: &[SourceStage], diags: &mut Diags) {
         let has = |kind| sp.stage(kind).is_some();
-        if has(StageKind::Fragment) && !has(StageKind::Vertex) {
-            if let Some(stage) = sp.stage(StageKind::Fragment) {
-                diags.push(sp.diag(
-                    stage.place,
-                    "a fragment stage needs a vertex stage in the same program",
-                ));
-            }
+        if let Some(stage) = sp.stage(StageKind::Fragment)
+            && !has(StageKind::Vertex)
+        {
+            diags.push(sp.diag(
+                stage.place,
+                "a fragment stage needs a vertex stage in the same program",
+            ));
         }
-        if has(StageKind::Compute) && has(StageKind::Vertex) {
-            if let Some(stage) = sp.stage(StageKind::Compute) {
-                diags.push(sp.diag(
-                    stage.place,
-                    "a program either draws or computes: a compute stage stands alone",
-                ));
-            }
+        if let Some(stage) = sp.stage(StageKind::Compute)
+            && has(StageKind::Vertex)
+        {
+            diags.push(sp.diag(
+                stage.place,
+                "a program either draws or computes: a compute stage stands alone",
+            ));
         }
         let mut entries: BTreeMap<&str, (&SourceStage, usize)> = BTreeMap::new();
         for stage in stages {
