@@ -342,9 +342,7 @@ impl File<'_> {
             }
         }
         self.line("/// The blocks of the composed programs: what a host puts into uniform and storage buffers.");
-        self.line(
-            "#[allow(dead_code, non_camel_case_types, non_snake_case, clippy::manual_memcpy)]",
-        );
+        self.line("#[allow(dead_code, non_camel_case_types, non_snake_case, clippy::all)]");
         self.line("pub mod blocks {");
         self.line(
             "    fn put(bytes: &mut [u8], at: usize, word: [u8; 4]) {\n        if let Some(place) = bytes.get_mut(at..at + 4) {\n            place.copy_from_slice(&word);\n        }\n    }\n",
@@ -504,7 +502,7 @@ fn block(name: &str, layout: &StructLayout, named: Named<'_>) -> Option<String> 
         } else {
             format!(
                 "{} (`{}`)",
-                member.doc.replace('\n', "\n        /// "),
+                escaped(&member.doc).replace('\n', "\n        /// "),
                 member.ty.wgsl()
             )
         };
@@ -535,7 +533,7 @@ fn block(name: &str, layout: &StructLayout, named: Named<'_>) -> Option<String> 
     let doc = if layout.doc.is_empty() {
         format!("The block `{}`.", layout.name)
     } else {
-        layout.doc.replace('\n', "\n    /// ")
+        escaped(&layout.doc).replace('\n', "\n    /// ")
     };
     let open = if size == layout.size {
         String::new()
@@ -707,6 +705,20 @@ fn float(x: f64) -> String {
     } else {
         format!("{x:?}")
     }
+}
+
+/// A comment of WGSL as rustdoc text: what rustdoc would take for a link or a tag is escaped.
+fn escaped(doc: &str) -> String {
+    let mut out = String::with_capacity(doc.len());
+    let mut code = false;
+    for c in doc.chars() {
+        code ^= c == '`';
+        if !code && matches!(c, '[' | ']' | '<') {
+            out.push('\\');
+        }
+        out.push(c);
+    }
+    out
 }
 
 /// A `Cow<'static, str>`.

@@ -206,7 +206,8 @@ fn sunlight(altitude: f32, mu: f32) -> vec3<f32> {
 
 // Light on a surface at a point with the zenith cosine `mu` of the sun, for an irradiance of 1.
 fn three_lights(altitude: f32, mu: f32) -> ThreeLights {
-    let sky = sunlight(SKY_LIGHT_ALTITUDE, mu);
+    // The sky's light: red as the sun that it comes from, and gone when the sun is six degrees below the horizon.
+    let sky = sunlight(SKY_LIGHT_ALTITUDE, mu) * smoothstep(-0.1, 0.35, mu);
     return ThreeLights(content.sun_light * sunlight(altitude, mu), content.sky_light * sky, content.bounce_light * sky);
 }
 

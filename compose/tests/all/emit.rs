@@ -52,6 +52,12 @@ fn variants_are_the_closure_of_scenes_and_presets() {
             .starts_with("diagnostic(off, derivative_uniformity);\n\n")
     );
     assert!(!output.rust.contains("fn still"));
+    // Units in brackets are no links for rustdoc.
+    assert!(
+        output
+            .rust
+            .contains("/// Where the eye is \\[m\\]. (`vec3<f32>`)")
+    );
 }
 
 #[test]
