@@ -79,7 +79,14 @@ impl Summary {
                 self.low = self.low.min(value);
                 self.high = self.high.max(value);
             } else if !truth.kink {
-                if error / truth.bar[k] > 0.7 && std::env::var("DBG").is_ok() { eprintln!("share {:.2} bar {:?} err {error:e} value {:?} got {value}", error/truth.bar[k], truth.bar, truth.value); }
+                if error / truth.bar[k] > 0.7 && std::env::var("DBG").is_ok() {
+                    eprintln!(
+                        "share {:.2} bar {:?} err {error:e} value {:?} got {value}",
+                        error / truth.bar[k],
+                        truth.bar,
+                        truth.value
+                    );
+                }
                 self.slope_error = self.slope_error.max(error);
                 self.slope_share = self.slope_share.max(error / truth.bar[k]);
             }
