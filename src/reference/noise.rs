@@ -60,6 +60,11 @@ pub fn octave_frequency(i: i32) -> f64 {
     2_f64.powi(i)
 }
 
+/// What the amplitude falls by from octave to octave, 2^-hurst.
+pub fn octave_fall(hurst: f64) -> f64 {
+    (-hurst).exp2()
+}
+
 /// The seed of octave i: a step of 2^32 / golden ratio an octave.
 pub fn octave_seed(seed: u32, i: i32) -> u32 {
     seed.wrapping_add(i.cast_unsigned().wrapping_mul(0x9e37_79b9))
@@ -207,7 +212,7 @@ pub fn lattice_gradient_3d(cell: [i32; 3], seed: u32) -> [f64; 3] {
     let p = sign(0) * sides[0];
     let q = sign(1) * sides[1];
     // The word as a signed number, in thirds of its range, says which component is 0; the others follow cyclically.
-    let third = (i64::from(word.cast_signed()) + (1 << 31)) * 3 >> 32;
+    let third = ((i64::from(word.cast_signed()) + (1 << 31)) * 3) >> 32;
     match third {
         0 => [0.0, p, q],
         1 => [q, 0.0, p],

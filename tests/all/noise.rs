@@ -6,6 +6,9 @@ use crate::sweep::{
 };
 use veduta::reference::noise::*;
 
+/// A lattice position as the twins give it.
+type Place = ([i32; 3], [f64; 3]);
+
 const ONE_NOISE: f64 = 2e-6;
 const ARGS_2D: &str = "vec2i(in.i[0], in.i[1]), vec2f(in.f[2], in.f[3]), in.u[4]";
 const ARGS_3D: &str = "vec3i(in.i[0], in.i[1], in.i[2]), vec3f(in.f[3], in.f[4], in.f[5]), in.u[6]";
@@ -94,10 +97,7 @@ fn lattice_positions_on_the_device_equal_their_twins() {
         row[7] = random.bits() as u32 % 22;
     }
     // The place as one number, axis by axis: a fraction rounded up to a whole cell counts as that cell.
-    let check = |name: &str,
-                 arguments: &str,
-                 twin: &dyn Fn(&[u32]) -> ([i32; 3], [f64; 3]),
-                 bound: f64| {
+    let check = |name: &str, arguments: &str, twin: &dyn Fn(&[u32]) -> Place, bound: f64| {
         let import = format!("veduta::noise::lattice::{name}");
         let mut worst = 0.0_f64;
         for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
@@ -258,6 +258,40 @@ fn fades_keep_their_bounds() {
             kink: false,
         });
     }
+}
+
+#[test]
+fn frequency_fall_and_seed_of_octaves() {
+    let import = |name: &str| format!("veduta::noise::lattice::{name}");
+    let device = evaluator(
+        &[&import("octave_frequency"), &import("octave_seed")],
+        "",
+        "vec2u(bitcast<u32>(octave_frequency(in.i[0])), octave_seed(in.u[1], in.i[0]))",
+        2,
+    );
+    for i in 0..=126 {
+        let found = device.run_bits(&[i, 77]).unwrap();
+        let i = i.cast_signed();
+        assert_eq!(float(found[0]), octave_frequency(i));
+        assert_eq!(found[1], octave_seed(77, i));
+    }
+    let device = evaluator(&[&import("octave_fall")], "", "octave_fall(in.f[0])", 1);
+    let rows: Vec<u32> = (0..=1 << 20)
+        .map(|k| (k as f32 / 262_144.0).to_bits())
+        .collect();
+    let found = device.run(&rows).unwrap();
+    let worst = rows
+        .iter()
+        .zip(&found)
+        .map(|(&h, found)| (found / octave_fall(float(h)) - 1.0).abs())
+        .fold(0.0, f64::max);
+    println!("octave_fall: error {worst:.2e} rel");
+    assert!(worst <= crate::sweep::header_error("veduta::noise::lattice::octave_fall"));
+    assert!(found.windows(2).all(|w| w[0] >= w[1]), "not monotone");
+    assert_eq!(
+        (found[0], found[1 << 18], found[1 << 20]),
+        (1.0, 0.5, 0.0625)
+    );
 }
 
 /// Values across the faces of cells: the last of one cell, the first of the next, and their slopes.

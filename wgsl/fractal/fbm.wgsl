@@ -8,7 +8,7 @@
 //! symbols  octaves number of octaves [1] · hurst Hurst exponent H, 1 smooth, 0 rough [1]
 #define_import_path veduta::fractal::fbm
 
-#import veduta::noise::lattice::{Lattice3d, split_2d, split_3d, wrap_3d, finer_2d, finer_3d, shifted_2d, shifted_3d, octave_seed, octave_frequency}
+#import veduta::noise::lattice::{Lattice3d, split_2d, split_3d, wrap_3d, finer_2d, finer_3d, shifted_2d, shifted_3d, octave_seed, octave_frequency, octave_fall}
 #import veduta::noise::gradient::{gradient_at_2d, gradient_at_3d, gradient_at_2d_slope, gradient_at_3d_slope}
 #import veduta::noise::value::{value_between_3d}
 
@@ -23,7 +23,7 @@
 /// error   5e-6 abs of reference::fractal::fbm_2d
 /// source  Leitner2022 alg. 1
 fn fbm_2d(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed: u32) -> f32 {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var sum = 0.0;
@@ -47,7 +47,7 @@ fn fbm_2d(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed: u32)
 /// error   5e-6 abs of reference::fractal::fbm_3d
 /// source  Leitner2022 alg. 1
 fn fbm_3d(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed: u32) -> f32 {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_3d(cell, frac);
     var amplitude = 1.0;
     var sum = 0.0;
@@ -73,7 +73,7 @@ fn fbm_3d(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed: u32)
 /// error   0.07 abs of reference::fractal::fbm_2d_slope
 /// source  Leitner2022 alg. 1
 fn fbm_2d_slope(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed: u32) -> vec3<f32> {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var sum = vec3<f32>(0.0);
@@ -100,7 +100,7 @@ fn fbm_2d_slope(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed
 /// error   0.07 abs of reference::fractal::fbm_3d_slope
 /// source  Leitner2022 alg. 1
 fn fbm_3d_slope(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed: u32) -> vec4<f32> {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_3d(cell, frac);
     var amplitude = 1.0;
     var sum = vec4<f32>(0.0);
@@ -125,7 +125,7 @@ fn fbm_3d_slope(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed
 /// error   6e-7 abs of reference::fractal::fbm_value_3d
 /// source  Leitner2022 8.2; departs: normalised
 fn fbm_value_3d(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed: u32) -> f32 {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_3d(cell, frac);
     var amplitude = 1.0;
     var sum = 0.0;
@@ -163,7 +163,7 @@ fn fbm_value_3d_periodic(
     hurst: f32,
     seed: u32,
 ) -> f32 {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     let base = split_3d(cell, frac);
     var p = Lattice3d(wrap_3d(base.cell, period), base.frac);
     var size = period;

@@ -4,7 +4,7 @@
 //! symbols  octaves number of octaves [1] · hurst Hurst exponent [1] · offset moves the noise towards positive values [1]
 #define_import_path veduta::fractal::hybrid
 
-#import veduta::noise::lattice::{split_2d, finer_2d, shifted_2d, octave_seed, octave_frequency}
+#import veduta::noise::lattice::{split_2d, finer_2d, shifted_2d, octave_seed, octave_frequency, octave_fall}
 #import veduta::noise::gradient::{gradient_at_2d, gradient_at_2d_slope}
 
 /// Hybrid multifractal of gradient noise in 2D. Musgrave's start values: hurst 0.25, offset 0.7.
@@ -26,7 +26,7 @@ fn hybrid_multifractal_2d(
     offset: f32,
     seed: u32,
 ) -> f32 {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = 1.0;
@@ -64,7 +64,7 @@ fn hybrid_multifractal_2d_slope(
     offset: f32,
     seed: u32,
 ) -> vec3<f32> {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = vec3<f32>(1.0, 0.0, 0.0);

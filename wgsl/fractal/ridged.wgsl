@@ -11,7 +11,7 @@
 //! symbols  smoothness square of the width over which crests are rounded [1]
 #define_import_path veduta::fractal::ridged
 
-#import veduta::noise::lattice::{split_2d, finer_2d, shifted_2d, octave_seed, octave_frequency}
+#import veduta::noise::lattice::{split_2d, finer_2d, shifted_2d, octave_seed, octave_frequency, octave_fall}
 #import veduta::noise::gradient::{gradient_at_2d, gradient_at_2d_slope}
 
 /// |n|, rounded about 0.
@@ -46,7 +46,7 @@ fn ridged_multifractal_2d(
     smoothness: f32,
     seed: u32,
 ) -> f32 {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = 1.0;
@@ -87,7 +87,7 @@ fn ridged_multifractal_2d_slope(
     smoothness: f32,
     seed: u32,
 ) -> vec3<f32> {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = vec3<f32>(1.0, 0.0, 0.0);
@@ -131,7 +131,7 @@ fn ridged_multifractal_printed_2d(
     smoothness: f32,
     seed: u32,
 ) -> f32 {
-    let fall = exp2(-hurst);
+    let fall = octave_fall(hurst);
     var p = split_2d(cell, frac);
     var amplitude = 1.0;
     var weight = 1.0;

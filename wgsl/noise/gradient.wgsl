@@ -6,7 +6,7 @@
 //! the scale is 1.3847.
 //!
 //! 2D directions are uniform on the circle: 23 bits of the hash are an angle within an octant, three more choose the
-//! octant. The sine and cosine are polynomials of ours, because WGSL promises only 2^-11 for its own.
+//! octant. The sine is a polynomial of ours, because WGSL promises only 2^-11 for its own.
 //! 3D directions are the 24 vertices of the two icosahedra with axes along
 //! the lattice's: vectors (0, +-a, +-b) and their permutations with a/b the golden ratio, a spherical 5-design. (The usual
 //! twelve edge centres are a 3-design: noise along the diagonals differs from noise along the axes.)
@@ -25,8 +25,8 @@ const SHORT_SIDE: f32 = 0.727979870951364;
 
 /// The vector at a lattice point in 2D: a random direction, length sqrt(2).
 ///
-/// Minimax polynomials of sqrt(2) cos and sqrt(2) sin over an octant, in u = angle / (pi/4). Each ends with the sum of a
-/// large exact term and a small one, so that there is one rounding of the vector's size.
+/// sqrt(2) sin(pi/4 u) over an octant is u plus a minimax polynomial, so that there is one rounding of its size; the
+/// cosine follows from the length.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
@@ -37,8 +37,8 @@ fn lattice_gradient_2d(cell: vec2<i32>, seed: u32) -> vec2<f32> {
     let h = lattice_hash_2d(cell, seed).x;
     let u = bitcast<f32>((h >> 9u) | 0x3f800000u) - 1.0;
     let q = u * u;
-    let long = 1.4140625 + (q * (q * (q * -0.000450960849726 + 0.0224151586834) - 0.436177759939) + 0.00015102324);
     let short = u + u * (q * (q * (q * -5.0847045569e-5 + 0.00352140138907) - 0.114191288864) + 0.110720731116);
+    let long = sqrt(2.0 - short * short);
     let swap = (h & 4u) != 0u;
     return vec2<f32>(
         bitcast<f32>(bitcast<u32>(select(long, short, swap)) ^ (h << 31u)),
