@@ -5,10 +5,14 @@ use std::path::{Path, PathBuf};
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut table = String::from("&[\n");
     let mut files = Vec::new();
-    for (name, variable) in [("presets", "DEP_VEDUTA_PRESETS"), ("wgsl", "DEP_VEDUTA_WGSL")] {
+    for (name, variable) in [
+        ("presets", "DEP_VEDUTA_PRESETS"),
+        ("wgsl", "DEP_VEDUTA_WGSL"),
+    ] {
         println!("cargo::rerun-if-env-changed={variable}");
         let folder = PathBuf::from(
-            std::env::var(variable).map_err(|e| format!("{variable}: {e}: veduta's build names it"))?,
+            std::env::var(variable)
+                .map_err(|e| format!("{variable}: {e}: veduta's build names it"))?,
         );
         println!("cargo::rerun-if-changed={}", folder.display());
         collect(&folder, name, &mut files)?;

@@ -89,10 +89,7 @@ impl Source {
         let composed = Composer::new(&library, keys)
             .compose(&sp, &features, &BTreeMap::new())
             .map_err(faults)?;
-        let mut composed = self::program(&composed)?;
-        // Features that make no difference are asked for as well.
-        composed.features = features.into_iter().map(Into::into).collect();
-        Ok(composed)
+        self::program(&composed)
     }
 }
 
@@ -173,6 +170,7 @@ pub fn program(composed: &Composed) -> Result<ComposedProgram, Error> {
     Ok(ComposedProgram {
         program: composed.program.clone().into(),
         features: composed.features.iter().cloned().map(Into::into).collect(),
+        mentions: composed.mentions.iter().cloned().map(Into::into).collect(),
         stages: composed
             .stages
             .iter()
@@ -369,10 +367,8 @@ fn storage_format(name: &str) -> Result<wgpu::TextureFormat, Error> {
     FORMATS
         .into_iter()
         .find(|f| format!("{f:?}") == name)
-        .ok_or_else(|| {
-            Error::MissingFeature {
-                name: format!("storage format {name}"),
-                why: "the program uses".to_owned(),
-            }
+        .ok_or_else(|| Error::MissingFeature {
+            name: format!("storage format {name}"),
+            why: "the program uses".to_owned(),
         })
 }

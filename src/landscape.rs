@@ -167,7 +167,8 @@ fn output_of(format: wgpu::TextureFormat) -> Result<f64, Error> {
         return Err(Error::OutOfDomain {
             name: "targets.color_format".to_owned(),
             value: format!("{format:?}"),
-            domain: "a colour format with at least three channels that a shader writes as floats".to_owned(),
+            domain: "a colour format with at least three channels that a shader writes as floats"
+                .to_owned(),
         });
     }
     Ok(if format.is_srgb() {

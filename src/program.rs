@@ -125,6 +125,8 @@ pub struct ComposedProgram {
     pub program: Text,
     /// The features that are on, in alphabetical order.
     pub features: List<Text>,
+    /// Every flag that the program mentions, on or off, in alphabetical order; others make no difference to it.
+    pub mentions: List<Text>,
     /// The stages in pipeline order.
     pub stages: List<StageSource>,
     /// Every resource, ordered by group and binding.
@@ -247,7 +249,11 @@ impl ProgramSet {
                 known: names.into_iter().map(str::to_owned).collect(),
             });
         }
-        let wanted: BTreeSet<&str> = features.iter().copied().collect();
+        let wanted: BTreeSet<&str> = features
+            .iter()
+            .copied()
+            .filter(|f| of_program.iter().any(|p| p.mentions.iter().any(|m| m == f)))
+            .collect();
         let distance = |p: &&ComposedProgram| {
             let have: BTreeSet<&str> = p.features.iter().map(|f| f.as_ref()).collect();
             have.symmetric_difference(&wanted).count()

@@ -313,7 +313,8 @@ impl Light {
                 domain: domain.to_owned(),
             })
         };
-        if !((self.to_light.length() - 1.0).abs() <= 1e-3) {
+        let off = (self.to_light.length() - 1.0).abs();
+        if off > 1e-3 || off.is_nan() {
             return fault("to_light", self.to_light.to_string(), "a unit vector");
         }
         if !self.irradiance.is_finite() || self.irradiance.min_element() < 0.0 {

@@ -290,7 +290,12 @@ impl Catalog {
         // A program of the user may have the name of one that ships only when nothing ships.
         let shipped = veduta::programs();
         catalog.set.default_preset = shipped.default_preset.clone();
-        if catalog.texts.programs.iter().any(|(_, file, _)| crate::shipped::text(file).is_some()) {
+        if catalog
+            .texts
+            .programs
+            .iter()
+            .any(|(_, file, _)| crate::shipped::text(file).is_some())
+        {
             catalog.set.programs = shipped.programs.clone();
         }
         catalog.fill_set();
@@ -409,9 +414,10 @@ impl Catalog {
         if let Some((name, file, text)) = own_file(name)? {
             return Ok(View::parse(&name, &file, &text)?);
         }
-        self.views.get(name).cloned().ok_or_else(|| {
-            missing("view", name, self.views.keys().map(String::as_str))
-        })
+        self.views
+            .get(name)
+            .cloned()
+            .ok_or_else(|| missing("view", name, self.views.keys().map(String::as_str)))
     }
 
     /// A program by its name or `.sp` file; with the file comes its folder of shaders for `SRC`.
@@ -471,9 +477,7 @@ impl Catalog {
             .collect();
         let composed = self.composer()?.compose(&sp, &features, &sizes)?;
         let mut composed = veduta::compose::program(&composed)?;
-        // Features that make no difference are asked for as well.
         composed.program = program.to_owned().into();
-        composed.features = features.into_iter().map(Into::into).collect();
         let programs = self.set.programs.to_mut();
         programs.retain(|p| p.program != composed.program || p.features != composed.features);
         programs.push(composed);
@@ -483,11 +487,9 @@ impl Catalog {
 
 /// A composer over a library that reads the files of `SRC` tags from what ships where they are there, else from the disk.
 pub fn composer(library: &Library, keys: Keys) -> Composer {
-    Composer::new(library, keys).reader(Box::new(|path| {
-        match crate::shipped::text(path) {
-            Some(text) => Ok(text.to_owned()),
-            None => std::fs::read_to_string(path),
-        }
+    Composer::new(library, keys).reader(Box::new(|path| match crate::shipped::text(path) {
+        Some(text) => Ok(text.to_owned()),
+        None => std::fs::read_to_string(path),
     }))
 }
 
@@ -504,11 +506,7 @@ fn insert<T>(
     }
 }
 
-fn missing<'a>(
-    what: &'static str,
-    name: &str,
-    known: impl Iterator<Item = &'a str>,
-) -> CliError {
+fn missing<'a>(what: &'static str, name: &str, known: impl Iterator<Item = &'a str>) -> CliError {
     let known: Vec<&str> = known.collect();
     let hint = match veduta_compose::diag::nearest(name, known.iter().copied()) {
         Some(near) => format!("did you mean `{near}`?"),

@@ -23,7 +23,11 @@ impl CpuTime {
         let field = |i: usize| fields.get(i)?.parse::<u64>().ok();
         let ticks = field(11)? + field(12)?;
         let mut threads = BTreeMap::new();
-        for entry in std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten() {
+        for entry in std::fs::read_dir("/proc/self/task")
+            .into_iter()
+            .flatten()
+            .flatten()
+        {
             let name = entry.file_name();
             let Some(id) = name.to_str().and_then(|n| n.parse().ok()) else {
                 continue;

@@ -56,7 +56,10 @@ pub fn numbered(path: &Path, number: u32) -> PathBuf {
 /// # Errors
 /// [`CliError::Argument`] for another ending than `ending`, [`CliError::Write`] for a missing folder.
 pub fn check_output(name: &str, path: &Path, ending: &str) -> Result<(), CliError> {
-    if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case(ending)) {
+    if path
+        .extension()
+        .is_none_or(|e| !e.eq_ignore_ascii_case(ending))
+    {
         return Err(CliError::argument(
             name,
             path.display().to_string(),
@@ -87,7 +90,10 @@ mod tests {
 
     #[test]
     fn frames_are_numbered() {
-        assert_eq!(numbered(Path::new("a/b.c.png"), 7), Path::new("a/b.c_0007.png"));
+        assert_eq!(
+            numbered(Path::new("a/b.c.png"), 7),
+            Path::new("a/b.c_0007.png")
+        );
         assert_eq!(numbered(Path::new("b"), 12345), Path::new("b_12345"));
     }
 }

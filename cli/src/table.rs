@@ -170,21 +170,13 @@ impl Table {
         }
         let big = ty.endianness() == npyz::Endianness::Big;
         let cells = match (kind, width) {
-            (npyz::TypeChar::Float, 4) => Cells::F32(
-                words::<4>(rest, big)
-                    .map(|w| f32::from_le_bytes(w))
-                    .collect(),
-            ),
-            (npyz::TypeChar::Float, _) => Cells::F64(
-                words::<8>(rest, big)
-                    .map(|w| f64::from_le_bytes(w))
-                    .collect(),
-            ),
-            _ => Cells::I64(
-                words::<8>(rest, big)
-                    .map(|w| i64::from_le_bytes(w))
-                    .collect(),
-            ),
+            (npyz::TypeChar::Float, 4) => {
+                Cells::F32(words::<4>(rest, big).map(f32::from_le_bytes).collect())
+            }
+            (npyz::TypeChar::Float, _) => {
+                Cells::F64(words::<8>(rest, big).map(f64::from_le_bytes).collect())
+            }
+            _ => Cells::I64(words::<8>(rest, big).map(i64::from_le_bytes).collect()),
         };
         Ok(Table { columns, cells })
     }
@@ -289,7 +281,8 @@ fn float_bits(value: f64, exact: Option<f32>, ty: Column) -> Result<u32, Misfit>
     }
     // i64 holds every value that can pass, and the comparison with 2^62 is exact.
     if value.fract() == 0.0 && value.abs() < 4.6e18 {
-        return integer_bits(value as i64, ty).map_err(|(_, needed)| (format!("{value:?}"), needed));
+        return integer_bits(value as i64, ty)
+            .map_err(|(_, needed)| (format!("{value:?}"), needed));
     }
     misfit()
 }
@@ -297,9 +290,7 @@ fn float_bits(value: f64, exact: Option<f32>, ty: Column) -> Result<u32, Misfit>
 fn integer_bits(value: i64, ty: Column) -> Result<u32, Misfit> {
     let misfit = |_| (value.to_string(), whole_number_needed(ty));
     match ty {
-        Column::I => i32::try_from(value)
-            .map(i32::cast_unsigned)
-            .map_err(misfit),
+        Column::I => i32::try_from(value).map(i32::cast_unsigned).map_err(misfit),
         Column::U => u32::try_from(value).map_err(misfit),
         Column::F => Ok((value as f32).to_bits()),
     }
@@ -484,9 +475,18 @@ mod tests {
                 &[],
             ),
             npy("{'descr': '<f8', 'fortran_order': 3, 'shape': (1,)}", &[]),
-            npy("{'descr': '<f8', 'fortran_order': False, 'shape': (-1,)}", &[]),
-            npy("{'descr': '<f16', 'fortran_order': False, 'shape': (1,)}", &[0; 16]),
-            npy("{'descr': '|O', 'fortran_order': False, 'shape': (1,)}", &[0; 8]),
+            npy(
+                "{'descr': '<f8', 'fortran_order': False, 'shape': (-1,)}",
+                &[],
+            ),
+            npy(
+                "{'descr': '<f16', 'fortran_order': False, 'shape': (1,)}",
+                &[0; 16],
+            ),
+            npy(
+                "{'descr': '|O', 'fortran_order': False, 'shape': (1,)}",
+                &[0; 8],
+            ),
         ] {
             assert!(matches!(
                 Table::from_npy(path, &bytes, 1),
@@ -529,11 +529,17 @@ mod tests {
             Ok(f32::INFINITY.to_bits())
         );
         let nan = f32::from_bits(0x7fc0_1234);
-        assert_eq!(float_bits(f64::from(nan), Some(nan), Column::F), Ok(0x7fc0_1234));
+        assert_eq!(
+            float_bits(f64::from(nan), Some(nan), Column::F),
+            Ok(0x7fc0_1234)
+        );
         assert_eq!(text_bits("1e3", Column::I), Ok(1000));
         assert_eq!(text_bits("-7", Column::I), Ok((-7_i32).cast_unsigned()));
         assert!(text_bits("1e39", Column::F).is_err());
-        assert_eq!(text_bits("-inf", Column::F), Ok(f32::NEG_INFINITY.to_bits()));
+        assert_eq!(
+            text_bits("-inf", Column::F),
+            Ok(f32::NEG_INFINITY.to_bits())
+        );
         assert!(text_bits("", Column::F).is_err());
         assert!(text_bits("9007199254740993", Column::U).is_err());
     }

@@ -2,9 +2,7 @@
 //!
 //! A user's whole build script:
 //! ```no_run
-//! fn main() {
-//!     veduta_compose::Build::new().modules("shaders").programs("shaders").preset("thesis_low").write();
-//! }
+//! veduta_compose::Build::new().modules("shaders").programs("shaders").preset("thesis_low").write();
 //! ```
 //! and in the program `mod shaders { include!(concat!(env!("OUT_DIR"), "/veduta_programs.rs")); }`.
 
@@ -361,6 +359,8 @@ impl Build {
                     continue;
                 }
             };
+            // veduta's own programs declare every override as a key; a user's need not.
+            composer.allow_any_override(!path.starts_with(&wgsl));
             let prepared = crate::sp::parse_bytes(&file, &bytes).and_then(|sp| {
                 let folder = path.parent().unwrap_or(Path::new(""));
                 watched.extend(sp.sources().into_iter().map(|source| folder.join(source)));

@@ -38,6 +38,8 @@ pub struct Composed {
     pub program: String,
     /// The features that are on, of those that make a difference; in alphabetical order.
     pub features: Vec<String>,
+    /// Every flag that the program or a module that it reaches mentions, on or off; in alphabetical order.
+    pub mentions: Vec<String>,
     /// The stages in pipeline order.
     pub stages: Vec<Stage>,
     /// The resources by group and binding, each with all stages that use it.
@@ -60,7 +62,8 @@ pub struct Composer {
     any_override: bool,
     require_headers: bool,
     read: Reader,
-    stages: BTreeMap<(String, StageKind, Defs), Rc<DoneStage>>,
+    /// By file, stage and values; with the text, as a file may come again with another one.
+    stages: BTreeMap<(String, StageKind, Defs), (String, Rc<DoneStage>)>,
     passed: BTreeSet<String>,
 }
 
@@ -73,6 +76,7 @@ pub struct Program {
     pub file: String,
     /// The flags and sizes that make a difference to it.
     pub relevant: BTreeSet<String>,
+    any_override: bool,
     stages: Vec<SourceStage>,
 }
 
@@ -182,11 +186,9 @@ impl Composer {
         self
     }
 
-    /// Lets programs declare overrides that are no keys.
-    #[must_use]
-    pub fn any_override(mut self, any: bool) -> Self {
+    /// Whether the programs that are prepared from now on may declare overrides that are no keys. Default: no.
+    pub fn allow_any_override(&mut self, any: bool) {
         self.any_override = any;
-        self
     }
 
     /// Whether every module must have headers in the grammar of `docs/modules.md`; else only those that start with `//!`.
@@ -285,6 +287,7 @@ impl Composer {
             name,
             file: sp.file().to_owned(),
             relevant,
+            any_override: self.any_override,
             stages,
         })
     }
@@ -339,28 +342,17 @@ impl Composer {
                 }
             }
         }
-        let roots: Vec<&str> = scan
+        let roots: Vec<String> = scan
             .imports()
             .map(|import| {
                 if library.is_plug_in(import) {
-                    // The path of the module is that of the whole import.
-                    import.item.as_str()
+                    import.path()
                 } else {
-                    import.module.as_str()
+                    import.module.clone()
                 }
             })
             .collect();
-        let plugged: Vec<String> = scan
-            .imports()
-            .filter(|import| library.is_plug_in(import))
-            .map(crate::scan::Import::path)
-            .collect();
-        let mut reached = library.reached(
-            roots
-                .iter()
-                .copied()
-                .chain(plugged.iter().map(String::as_str)),
-        );
+        let mut reached = library.reached(roots.iter().map(String::as_str));
         // A plug-in counts where the module that it changes is reached.
         let plug_ins: Vec<String> = self
             .plug_ins
@@ -395,21 +387,21 @@ impl Composer {
     /// What concerns more than one stage.
     fn lint_program(&self, sp: &SpFile, stages: &[SourceStage], diags: &mut Diags) {
         let has = |kind| sp.stage(kind).is_some();
-        if has(StageKind::Fragment) && !has(StageKind::Vertex) {
-            if let Some(stage) = sp.stage(StageKind::Fragment) {
-                diags.push(sp.diag(
-                    stage.place,
-                    "a fragment stage needs a vertex stage in the same program",
-                ));
-            }
+        if let Some(stage) = sp.stage(StageKind::Fragment)
+            && !has(StageKind::Vertex)
+        {
+            diags.push(sp.diag(
+                stage.place,
+                "a fragment stage needs a vertex stage in the same program",
+            ));
         }
-        if has(StageKind::Compute) && has(StageKind::Vertex) {
-            if let Some(stage) = sp.stage(StageKind::Compute) {
-                diags.push(sp.diag(
-                    stage.place,
-                    "a program either draws or computes: a compute stage stands alone",
-                ));
-            }
+        if let Some(stage) = sp.stage(StageKind::Compute)
+            && has(StageKind::Vertex)
+        {
+            diags.push(sp.diag(
+                stage.place,
+                "a program either draws or computes: a compute stage stands alone",
+            ));
         }
         let mut entries: BTreeMap<&str, (&SourceStage, usize)> = BTreeMap::new();
         for stage in stages {
@@ -555,6 +547,11 @@ impl Composer {
         Ok(Composed {
             program: program.name.clone(),
             features: feature_names,
+            mentions: program
+                .relevant
+                .intersection(&self.declared.flags)
+                .cloned()
+                .collect(),
             stages: done
                 .iter()
                 .map(|(stage, outcome)| Stage {
@@ -582,13 +579,14 @@ impl Composer {
             .map(|(name, def)| (name.clone(), *def))
             .collect();
         let key = (program.file.clone(), stage.kind, defs);
-        // The same program may come again with another text, when it is reloaded at run time.
-        let key = (format!("{}\n{}", key.0, stage.stitched.text), key.1, key.2);
-        if let Some(done) = self.stages.get(&key) {
+        if let Some((text, done)) = self.stages.get(&key)
+            && *text == stage.stitched.text
+        {
             return Ok(done.clone());
         }
         let done = Rc::new(self.compose_stage(program, stage, &key.2)?);
-        self.stages.insert(key, done.clone());
+        self.stages
+            .insert(key, (stage.stitched.text.clone(), done.clone()));
         Ok(done)
     }
 
@@ -673,6 +671,10 @@ impl Composer {
                 push_new(&mut diags, stage.gate_diag(&fault, self.linker.library()));
             }
             if diags.is_empty() {
+                // More than any build has; a program that reloads for days must not grow.
+                if self.passed.len() >= 4096 {
+                    self.passed.clear();
+                }
                 self.passed.insert(finished.wgsl.clone());
             }
         }
@@ -684,7 +686,7 @@ impl Composer {
             }
         };
         for item in &mut tables.overrides {
-            self.check_override(item, stage, &mut diags);
+            self.check_override(item, program, stage, &mut diags);
         }
         diags.ok(DoneStage {
             wgsl: finished.wgsl,
@@ -694,7 +696,13 @@ impl Composer {
     }
 
     /// An override bears the name, type and default of a quality key.
-    fn check_override(&self, item: &mut Override, stage: &SourceStage, diags: &mut Diags) {
+    fn check_override(
+        &self,
+        item: &mut Override,
+        program: &Program,
+        stage: &SourceStage,
+        diags: &mut Diags,
+    ) {
         let name = item.name.clone();
         let mut push = |message: String, notes: Vec<String>| {
             let mut diag = stage.diag_of(Some(&name), &message);
@@ -702,7 +710,7 @@ impl Composer {
             push_new(diags, diag);
         };
         let Some(key) = self.keys.get(&item.name) else {
-            if !self.any_override {
+            if !program.any_override {
                 let overridable = self.keys.iter().filter(|key| {
                     key.kind == KeyKind::Quality
                         && matches!(key.ty, KeyType::I32 | KeyType::U32 | KeyType::F32)

@@ -107,6 +107,8 @@ impl File<'_> {
         let name = |what: &str| format!("P{index}_{what}");
         let features: Vec<String> = composed.features.iter().map(|f| text(f)).collect();
         self.list(&name("FEATURES"), &format!("{p}::Text"), &features);
+        let mentions: Vec<String> = composed.mentions.iter().map(|f| text(f)).collect();
+        self.list(&name("MENTIONS"), &format!("{p}::Text"), &mentions);
         let mut stages = Vec::new();
         for stage in &composed.stages {
             let kind = match stage.kind {
@@ -304,9 +306,10 @@ impl File<'_> {
             .enumerate()
             .map(|(index, (program, _))| {
                 format!(
-                    "{p}::ComposedProgram {{ program: {}, features: {}, stages: {}, bindings: {}, overrides: {}, structs: {} }}",
+                    "{p}::ComposedProgram {{ program: {}, features: {}, mentions: {}, stages: {}, bindings: {}, overrides: {}, structs: {} }}",
                     text(program),
                     borrowed(&format!("P{index}_FEATURES")),
+                    borrowed(&format!("P{index}_MENTIONS")),
                     borrowed(&format!("P{index}_STAGES")),
                     borrowed(&format!("P{index}_BINDINGS")),
                     borrowed(&format!("P{index}_OVERRIDES")),
@@ -342,7 +345,7 @@ impl File<'_> {
             }
         }
         self.line("/// The blocks of the composed programs: what a host puts into uniform and storage buffers.");
-        self.line("#[allow(dead_code, non_camel_case_types, non_snake_case, clippy::manual_memcpy)]");
+        self.line("#[allow(dead_code, non_camel_case_types, non_snake_case, clippy::all)]");
         self.line("pub mod blocks {");
         self.line(
             "    fn put(bytes: &mut [u8], at: usize, word: [u8; 4]) {\n        if let Some(place) = bytes.get_mut(at..at + 4) {\n            place.copy_from_slice(&word);\n        }\n    }\n",
@@ -502,7 +505,7 @@ fn block(name: &str, layout: &StructLayout, named: Named<'_>) -> Option<String> 
         } else {
             format!(
                 "{} (`{}`)",
-                member.doc.replace('\n', "\n        /// "),
+                escaped(&member.doc).replace('\n', "\n        /// "),
                 member.ty.wgsl()
             )
         };
@@ -533,7 +536,7 @@ fn block(name: &str, layout: &StructLayout, named: Named<'_>) -> Option<String> 
     let doc = if layout.doc.is_empty() {
         format!("The block `{}`.", layout.name)
     } else {
-        layout.doc.replace('\n', "\n    /// ")
+        escaped(&layout.doc).replace('\n', "\n    /// ")
     };
     let open = if size == layout.size {
         String::new()
@@ -705,6 +708,20 @@ fn float(x: f64) -> String {
     } else {
         format!("{x:?}")
     }
+}
+
+/// A comment of WGSL as rustdoc text: what rustdoc would take for a link or a tag is escaped.
+fn escaped(doc: &str) -> String {
+    let mut out = String::with_capacity(doc.len());
+    let mut code = false;
+    for c in doc.chars() {
+        code ^= c == '`';
+        if !code && matches!(c, '[' | ']' | '<') {
+            out.push('\\');
+        }
+        out.push(c);
+    }
+    out
 }
 
 /// A `Cow<'static, str>`.

@@ -13,6 +13,9 @@ pub const LONGEST_TEXT: usize = 1 << 20;
 /// The most modules in one library: naga_oil numbers them in what is left of 32 bits.
 pub const MOST_MODULES: usize = 2000;
 
+/// The most ways from one module through its imports to others: naga_oil walks each of them.
+pub const MOST_WAYS: u64 = 1 << 17;
+
 /// One module: a `.wgsl` file with `#define_import_path`.
 #[derive(Clone, Debug)]
 pub struct Module {
@@ -118,11 +121,11 @@ impl Library {
             let scan = Scan::new(&text);
             let Some((path, at)) = scan.import_path() else {
                 // A piece for SRC, unless it tries to be a module.
-                for fault in scan.faults.iter().filter(|fault| {
-                    text[fault.at..]
-                        .trim_start_matches(['#', ' '])
-                        .starts_with("def")
-                }) {
+                let in_path_line = |at: usize| {
+                    let start = text[..at].rfind(['\n', '\r']).map_or(0, |n| n + 1);
+                    text[start..].trim_start().starts_with("#def")
+                };
+                for fault in scan.faults.iter().filter(|fault| in_path_line(fault.at)) {
                     let mut diag = Diag::at(file.clone(), &text, fault.at, fault.message.clone());
                     diag.notes.clone_from(&fault.notes);
                     diags.push(diag);
@@ -172,6 +175,9 @@ impl Library {
             ));
         }
         library.sort(&mut diags);
+        if diags.is_empty() {
+            library.count_ways(&mut diags);
+        }
         diags.ok(library)
     }
 
@@ -284,6 +290,32 @@ impl Library {
             ));
         }
         None
+    }
+
+    /// A fault for the first module with too many ways through its imports.
+    fn count_ways(&self, diags: &mut Diags) {
+        let mut ways: BTreeMap<&str, u64> = BTreeMap::new();
+        for module in self.order.iter().filter_map(|path| self.modules.get(path)) {
+            let mut own = 1u64;
+            for import in module.imported() {
+                own = own.saturating_add(ways.get(import).copied().unwrap_or(0));
+            }
+            if own > MOST_WAYS {
+                let at = module.scan.import_path().map_or(0, |(_, at)| at);
+                diags.push(
+                    module
+                        .diag(
+                            at,
+                            format!(
+                                "the imports of this module lead to other modules in more than {MOST_WAYS} ways"
+                            ),
+                        )
+                        .note("naga_oil walks each of them: import from fewer modules, or merge some"),
+                );
+                return;
+            }
+            ways.insert(&module.path, own);
+        }
     }
 
     /// Orders the modules and names a cycle.

@@ -45,9 +45,7 @@ thread_local! {
 
 /// A composer without modules.
 fn fresh(capabilities: naga::valid::Capabilities) -> Composer {
-    let mut composer = POOL
-        .with_borrow_mut(Vec::pop)
-        .unwrap_or_else(Composer::default);
+    let mut composer = POOL.with_borrow_mut(Vec::pop).unwrap_or_default();
     composer.capabilities = capabilities;
     composer
 }

@@ -56,8 +56,8 @@ pub fn lint(
     names_in_conditions(what, text, scan, declared, &mut faults);
     imports(text, scan, library, &mut faults);
     heads(what, scan, capabilities, &mut faults);
-    items(what, scan, library, &mut faults);
-    tokens(what, text, scan, &mut faults);
+    items(what, scan, &mut faults);
+    tokens(text, scan, &mut faults);
     faults.sort_by_key(|fault| fault.at);
     faults.dedup();
     faults
@@ -275,15 +275,12 @@ fn heads(what: Text<'_>, scan: &Scan, capabilities: Capabilities, faults: &mut V
                 head.start,
                 format!("`{}` belongs in a program, not in a module", head.word),
             )),
-            "requires" => {
-                if naga::front::wgsl::parse_str(&head.text).is_err() {
-                    let names: Vec<&str> =
-                        head.names.iter().map(|(name, _)| name.as_str()).collect();
-                    faults.push(fault(
-                        head.start,
-                        format!("naga 30 does not know {}", quoted(&names)),
-                    ));
-                }
+            "requires" if naga::front::wgsl::parse_str(&head.text).is_err() => {
+                let names: Vec<&str> = head.names.iter().map(|(name, _)| name.as_str()).collect();
+                faults.push(fault(
+                    head.start,
+                    format!("naga 30 does not know {}", quoted(&names)),
+                ));
             }
             "diagnostic" => {
                 const SEVERITIES: [&str; 4] = ["off", "info", "warning", "error"];
@@ -306,7 +303,7 @@ fn heads(what: Text<'_>, scan: &Scan, capabilities: Capabilities, faults: &mut V
     }
 }
 
-fn items(what: Text<'_>, scan: &Scan, library: &Library, faults: &mut Vec<Fault>) {
+fn items(what: Text<'_>, scan: &Scan, faults: &mut Vec<Fault>) {
     if let (Text::Stage, Some((path, at))) = (what, scan.import_path()) {
         faults.push(fault(
             at,
@@ -328,7 +325,7 @@ fn items(what: Text<'_>, scan: &Scan, library: &Library, faults: &mut Vec<Fault>
         }
         match what {
             Text::Module(path) => module_item(path, item, faults),
-            Text::Stage => program_item(item, library, faults),
+            Text::Stage => program_item(item, faults),
         }
     }
 }
@@ -416,7 +413,7 @@ fn module_item(path: &str, item: &Item, faults: &mut Vec<Fault>) {
     }
 }
 
-fn program_item(item: &Item, _library: &Library, faults: &mut Vec<Fault>) {
+fn program_item(item: &Item, faults: &mut Vec<Fault>) {
     let name = &item.name;
     let is_entry = item
         .attributes
@@ -449,7 +446,7 @@ fn quoted(names: &[&str]) -> String {
         .join(", ")
 }
 
-fn tokens(what: Text<'_>, text: &str, scan: &Scan, faults: &mut Vec<Fault>) {
+fn tokens(text: &str, scan: &Scan, faults: &mut Vec<Fault>) {
     let word = |i: usize| -> &str {
         scan.tokens
             .get(i)
@@ -519,15 +516,15 @@ fn tokens(what: Text<'_>, text: &str, scan: &Scan, faults: &mut Vec<Fault>) {
                     ));
                 }
             }
-            (Kind::Ident, name) if name.contains("X_naga_oil_") => {
-                if !scan.items.iter().any(|item| item.at == token.start) {
-                    faults.push(fault(token.start, "`X_naga_oil_` is reserved for the linker"));
-                }
+            (Kind::Ident, name)
+                if name.contains("X_naga_oil_")
+                    && !scan.items.iter().any(|item| item.at == token.start) =>
+            {
+                faults.push(fault(token.start, "`X_naga_oil_` is reserved for the linker"));
             }
             _ => {}
         }
     }
-    let _ = what;
 }
 
 /// The function in whose argument list the unary `&` at token `at` starts an argument.
@@ -667,6 +664,14 @@ pub fn check_modules(linker: &mut Linker, declared: &Declared) -> Diags {
             });
             if let Err(more) = outcome {
                 for mut diag in more.0 {
+                    // As an import the module has no text of its own for what concerns it as a whole.
+                    if diag.file == module.file
+                        && crate::diag::line_at(&module.text, diag.line) != diag.source_line
+                    {
+                        let notes = std::mem::take(&mut diag.notes);
+                        diag = Diag::whole_file(&module.file, diag.message);
+                        diag.notes = notes;
+                    }
                     if !defs.is_empty() {
                         let on: Vec<&str> = defs.keys().map(String::as_str).collect();
                         diag = diag.note(format!("with {} on", quoted(&on)));

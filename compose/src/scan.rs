@@ -243,7 +243,7 @@ impl Scan {
     pub fn new(text: &str) -> Self {
         let mut scan = Self::default();
         scan.tokenize(text);
-        scan.nesting(text);
+        scan.nesting();
         scan.find_items(text);
         scan.faults.sort_by_key(|fault| fault.at);
         scan
@@ -449,27 +449,22 @@ impl Scan {
                 end = word_end;
             }
         }
-        let kind = self.directive_kind(text, start, &words);
+        let kind = self.directive_kind(start, &words);
         self.directives.push(Directive { start, end, kind });
         self.push(Kind::Directive, start, end);
         end
     }
 
-    fn directive_kind(
-        &mut self,
-        text: &str,
-        start: usize,
-        words: &[(&str, usize)],
-    ) -> DirectiveKind {
+    fn directive_kind(&mut self, start: usize, words: &[(&str, usize)]) -> DirectiveKind {
         let Some(&(word, word_at)) = words.first() else {
             self.fault(start, "`#` without a directive");
             return DirectiveKind::Faulty;
         };
         match word {
-            "ifdef" | "ifndef" | "if" => self.condition(text, false, words),
+            "ifdef" | "ifndef" | "if" => self.condition(false, words),
             "else" => match words.get(1) {
                 None => DirectiveKind::Else,
-                Some(("ifdef" | "ifndef" | "if", _)) => self.condition(text, true, &words[1..]),
+                Some(("ifdef" | "ifndef" | "if", _)) => self.condition(true, &words[1..]),
                 Some(&(tail, at)) => {
                     self.fault(at, format!("unexpected `{tail}` after `#else`"));
                     DirectiveKind::Else
@@ -553,7 +548,7 @@ impl Scan {
     }
 
     /// `words` starts with `ifdef`, `ifndef` or `if`.
-    fn condition(&mut self, text: &str, is_else: bool, words: &[(&str, usize)]) -> DirectiveKind {
+    fn condition(&mut self, is_else: bool, words: &[(&str, usize)]) -> DirectiveKind {
         let (word, word_at) = words[0];
         let after = |(word, at): (&str, usize)| at + word.len();
         // A condition that cannot be read still opens a block, so that its `#endif` is not a second fault.
@@ -613,7 +608,7 @@ impl Scan {
                 return unreadable("", at);
             };
             let rest = if negative { 5 } else { 4 };
-            self.no_tail(text, words, rest);
+            self.no_tail(words, rest);
             Test::Compare {
                 name: name.to_owned(),
                 at,
@@ -621,7 +616,7 @@ impl Scan {
                 value: if negative { -value } else { value },
             }
         } else {
-            self.no_tail(text, words, 2);
+            self.no_tail(words, 2);
             Test::Defined {
                 name: name.to_owned(),
                 at,
@@ -632,7 +627,7 @@ impl Scan {
     }
 
     /// A fault if the line goes on after its condition.
-    fn no_tail(&mut self, _text: &str, words: &[(&str, usize)], from: usize) {
+    fn no_tail(&mut self, words: &[(&str, usize)], from: usize) {
         if let Some(&(tail, at)) = words.get(from) {
             let fault = self.fault(at, format!("unexpected `{tail}` after the condition"));
             if tail == "&&" || tail == "||" {
@@ -644,7 +639,7 @@ impl Scan {
     }
 
     /// Checks how conditions nest and records in which branches the imports stand.
-    fn nesting(&mut self, _text: &str) {
+    fn nesting(&mut self) {
         struct Open {
             at: usize,
             id: u32,
@@ -653,6 +648,7 @@ impl Scan {
         }
         let mut stack: Vec<Open> = Vec::new();
         let mut next_id = 0;
+        let mut has_path = false;
         let mut faults = Vec::new();
         let mut fault = |at: usize, message: &str| {
             faults.push(Fault {
@@ -701,7 +697,15 @@ impl Scan {
                         import.scope = stack.iter().map(|open| (open.id, open.branch)).collect();
                     }
                 }
-                DirectiveKind::ImportPath { .. } | DirectiveKind::Faulty => {}
+                DirectiveKind::ImportPath { at, .. } => {
+                    if has_path {
+                        fault(*at, "a second `#define_import_path` in one file");
+                    } else if !stack.is_empty() {
+                        fault(*at, "`#define_import_path` must not depend on a condition");
+                    }
+                    has_path = true;
+                }
+                DirectiveKind::Faulty => {}
             }
         }
         for open in stack {

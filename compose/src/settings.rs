@@ -401,19 +401,19 @@ pub struct View {
     pub name: String,
     /// What the view shows.
     pub meaning: String,
-    /// Height of the eye above the ground [m], in [0, 1e8].
+    /// Height of the eye above the ground \[m\], in [0, 1e8].
     pub eye_height: f64,
-    /// Pitch above the horizon [degree], in [-90, 90].
+    /// Pitch above the horizon \[degree\], in [-90, 90].
     pub pitch_deg: f64,
-    /// Field of view [degree], in [1, 170].
+    /// Field of view \[degree\], in [1, 170].
     pub fov_deg: f64,
-    /// Height of the sun above the horizon [degree], in [-90, 90].
+    /// Height of the sun above the horizon \[degree\], in [-90, 90].
     pub sun_height_deg: f64,
-    /// Azimuth of the sun from the view [degree], in [-360, 360].
+    /// Azimuth of the sun from the view \[degree\], in [-360, 360].
     pub sun_azimuth_deg: f64,
-    /// Where the eye is over the ground, x and z [m], each in [-1e12, 1e12]; (0, 0) if not given.
+    /// Where the eye is over the ground, x and z \[m\], each in [-1e12, 1e12]; (0, 0) if not given.
     pub place: (f64, f64),
-    /// Azimuth of the view [degree], in [-360, 360]; 0 if not given.
+    /// Azimuth of the view \[degree\], in [-360, 360]; 0 if not given.
     pub yaw_deg: f64,
 }
 

@@ -212,7 +212,7 @@ pub fn lattice_gradient_3d(cell: [i32; 3], seed: u32) -> [f64; 3] {
     let p = sign(0) * sides[0];
     let q = sign(1) * sides[1];
     // The word as a signed number, in thirds of its range, says which component is 0; the others follow cyclically.
-    let third = (i64::from(word.cast_signed()) + (1 << 31)) * 3 >> 32;
+    let third = ((i64::from(word.cast_signed()) + (1 << 31)) * 3) >> 32;
     match third {
         0 => [0.0, p, q],
         1 => [q, 0.0, p],

@@ -10,7 +10,7 @@ const RADIUS: f64 = 6.36e6;
 
 const LAYER: &str = "
 fn layer(coverage: f32, uniformity: f32, extinction: f32, backward_share: f32) -> CloudLayer {
-    return CloudLayer(vec3i(3, -1, 7), vec3f(0.25, 0.5, 0.75), 4000.0, 4, 6, 1.0, 4000.0, 1500.0, coverage, uniformity,
+    return CloudLayer(vec3i(3, -1, 7), vec3f(0.25, 0.5, 0.75), 4000.0, 4, 1.0, 4000.0, 1500.0, coverage, uniformity,
         extinction, 0.9, 0.7, -0.5, backward_share, 2u);
 }
 ";

@@ -124,9 +124,8 @@ pub fn draw_with(
         .chunks_exact(texel)
         .map(|pixel| match texel {
             4 => [0, 1, 2, 3].map(|i| f32::from(pixel[i]) / 255.0),
-            _ => [0, 4, 8, 12].map(|i| {
-                f32::from_le_bytes([pixel[i], pixel[i + 1], pixel[i + 2], pixel[i + 3]])
-            }),
+            _ => [0, 4, 8, 12]
+                .map(|i| f32::from_le_bytes([pixel[i], pixel[i + 1], pixel[i + 2], pixel[i + 3]])),
         })
         .collect();
     Picture {

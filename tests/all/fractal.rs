@@ -191,6 +191,15 @@ fn row_l07_fbm() {
     });
     assert!(s.low >= 0.0 && s.high <= 1.0, "{s:?}");
 
+    let arguments = format!("{AT_3D}, vec3i(in.i[11], in.i[12], in.i[13]), in.f[8], in.u[6]");
+    let name = of("fbm_value_3d_periodic_six");
+    let s = check(&name, &arguments, 14, POINTS, periodic, |r| {
+        let h = hurst::<3>(r);
+        let v = fbm_value_3d_periodic(cell(r), floats(&r[3..]), cell(&r[11..]), 6, h, r[6]);
+        normalised(&[&r[..7], &[6], &r[8..]].concat(), v)
+    });
+    assert!(s.low >= 0.0 && s.high <= 1.0, "{s:?}");
+
     // A lower Hurst exponent raises the energy of fine detail, as a share of the whole.
     let shares = [1.0, 0.7, 0.4, 0.1].map(|hurst| {
         let (fine, total) = energies(hurst, 6);
@@ -247,7 +256,10 @@ fn row_l07_fbm() {
         fill::<2>(&mut random, row);
     }
     for found in device.run(&rows).unwrap().chunks(3) {
-        assert!(found[0].abs() < 1e-6 && found[1..] == [0.0, 0.0], "{found:?}");
+        assert!(
+            found[0].abs() < 1e-6 && found[1..] == [0.0, 0.0],
+            "{found:?}"
+        );
     }
 }
 

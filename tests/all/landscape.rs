@@ -5,7 +5,10 @@ use veduta::compose::{Reloader, Source};
 use veduta::glam::{DVec3, I64Vec3, Vec3};
 use veduta::program::{KeyKind, StageKind};
 use veduta::view::direction;
-use veduta::{Error, Landscape, LandscapeOptions, Light, Preset, Settings, Targets, Value, View, WorldPos, programs};
+use veduta::{
+    Error, Landscape, LandscapeOptions, Light, Preset, Settings, Targets, Value, View, WorldPos,
+    programs,
+};
 
 const HDR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 const SMALL: [u32; 2] = [64, 36];
@@ -27,7 +30,8 @@ fn landscape(preset: &str, scene: &str, values: &[(&str, Value)]) -> Landscape {
         values: values.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect(),
     };
     // What the shipped presets do not need is composed here.
-    let settings = Settings::resolve(&programs, &options.preset, Some(scene), &options.values).unwrap();
+    let settings =
+        Settings::resolve(&programs, &options.preset, Some(scene), &options.values).unwrap();
     programs
         .get_or_compose(&source, "landscape", &settings.features())
         .unwrap();
@@ -48,7 +52,9 @@ pub fn frozen(name: &str, time: f64) -> View {
         .split("place: (")
         .nth(1)
         .map(|rest| {
-            let mut numbers = rest.split([',', ')']).map(|n| n.trim().parse::<f64>().unwrap());
+            let mut numbers = rest
+                .split([',', ')'])
+                .map(|n| n.trim().parse::<f64>().unwrap());
             [numbers.next().unwrap(), numbers.next().unwrap()]
         })
         .unwrap_or([0.0; 2]);
@@ -112,8 +118,16 @@ fn difference(a: &Picture, b: &Picture) -> f64 {
 
 #[test]
 fn row_l01_one_fragment_pass_without_textures() {
-    for program in programs().programs.iter().filter(|p| p.program == "landscape") {
-        assert_eq!(program.stages.len(), 2, "a covering triangle and the picture");
+    for program in programs()
+        .programs
+        .iter()
+        .filter(|p| p.program == "landscape")
+    {
+        assert_eq!(
+            program.stages.len(),
+            2,
+            "a covering triangle and the picture"
+        );
         for binding in program.bindings.iter() {
             assert!(
                 matches!(
@@ -155,21 +169,27 @@ fn the_first_view_is_about_two_thirds_sky() {
     let mut black = frozen("V01", 0.0);
     // Without air the sky is black and the ground is not.
     black.sun.to_light = direction(0.5, 2.0).as_vec3();
-    land.set_content("RAYLEIGH_SCATTERING", Value::Vec3([0.0; 3])).unwrap();
-    land.set_content("MIE_SCATTERING", Value::Float(0.0)).unwrap();
-    land.set_content("MIE_EXTINCTION", Value::Float(0.0)).unwrap();
+    land.set_content("RAYLEIGH_SCATTERING", Value::Vec3([0.0; 3]))
+        .unwrap();
+    land.set_content("MIE_SCATTERING", Value::Float(0.0))
+        .unwrap();
+    land.set_content("MIE_EXTINCTION", Value::Float(0.0))
+        .unwrap();
     let picture = draw(&mut land, &black, [128, 72], HDR);
-    let sky = picture.pixels.iter().filter(|p| p[2] == 0.0).count() as f64 / picture.pixels.len() as f64;
+    let sky =
+        picture.pixels.iter().filter(|p| p[2] == 0.0).count() as f64 / picture.pixels.len() as f64;
     println!("sky share of V01: {sky:.3}");
     assert!((0.5..0.75).contains(&sky), "{sky}");
 }
 
 #[test]
 fn row_l15_octaves_act_apart() {
-    let view = frozen("V01", 0.0);
+    // A low sun, so that there are shadows.
+    let mut view = frozen("V01", 0.0);
+    view.sun.to_light = direction(0.15, 2.0).as_vec3();
     let mut base = landscape("thesis", "clear", &[]);
     let whole = draw(&mut base, &view, SMALL, HDR);
-    for (key, value) in [("OCTAVES", 5), ("OCTAVES_SHADOW", 2), ("OCTAVES_NORMAL", 5)] {
+    for (key, value) in [("OCTAVES", 5), ("OCTAVES_SHADOW", 1), ("OCTAVES_NORMAL", 5)] {
         let mut other = landscape("thesis", "clear", &[(key, Value::Int(value))]);
         let picture = draw(&mut other, &view, SMALL, HDR);
         let change = difference(&whole, &picture);
@@ -178,7 +198,11 @@ fn row_l15_octaves_act_apart() {
         if key != "OCTAVES" {
             // The sky, where no ground is met, stays the same to the bit.
             let sky = SMALL[0] as usize;
-            assert_eq!(whole.pixels[..sky], picture.pixels[..sky], "{key} changes the sky as well");
+            assert_eq!(
+                whole.pixels[..sky],
+                picture.pixels[..sky],
+                "{key} changes the sky as well"
+            );
         }
     }
 }
@@ -216,9 +240,13 @@ fn row_l34_jitter_trades_stripes_for_noise() {
     let (a, b) = (roughness(&striped), roughness(&noisy));
     println!("second difference without jitter {a:.5}, with {b:.5}");
     assert!(b > 1.2 * a, "jitter adds no noise");
-    let (ma, mb) = (striped.mean(|_, _| true), noisy.mean(|_, _| true));
+    let without_sun = |p: &Picture| p.mean(|x, y| p.pixels[y * p.width as usize + x][1] < 5.0);
+    let (ma, mb) = (without_sun(&striped), without_sun(&noisy));
     for c in 0..3 {
-        assert!((ma[c] - mb[c]).abs() < 0.05 * ma[c], "mean changed: {ma:?} {mb:?}");
+        assert!(
+            (ma[c] - mb[c]).abs() < 0.05 * ma[c],
+            "mean changed: {ma:?} {mb:?}"
+        );
     }
 }
 
@@ -227,8 +255,12 @@ fn row_l37_the_flight_follows_the_ground_and_moves_the_world() {
     for time in [0.0, 1.0, 60.0, 1e6] {
         let view = frozen("V01", time);
         let ground = ground_height(view.eye);
-        assert!((view.eye.altitude() - ground - 300.0).abs() < 1e-3, "{time}");
-        assert!((view.eye.to_metres().z + 50.0 * time).abs() < 1e-6 * (1.0 + time));
+        assert!(
+            (view.eye.altitude() - ground - 300.0).abs() < 1e-3,
+            "{time}"
+        );
+        let flown = frozen("V01", 0.0).eye.to_metres().z - view.eye.to_metres().z;
+        assert!((flown - 50.0 * time).abs() < 1e-3, "{time}: {flown} m");
     }
     let mut land = landscape("thesis", "thesis", &[("CLOUD_STEPS", Value::Int(8))]);
     let size = [48, 27];
@@ -267,23 +299,57 @@ fn far_from_the_origin_nothing_is_lost() {
 fn row_l38_every_parameter_exists_and_acts() {
     // Section 10 of the source, and the parameters that it mentions without a name.
     let named = [
-        "LOW_QUALITY", "MAX_RENDERING_DISTANCE", "MAX_MARCHING_STEPS", "MAX_MARCHING_STEPS_SHADOW", "TEXTURE_LOW_QUALITY",
-        "TEXTURE_FILTERING", "FILTERING_SAMPLES", "ATMOS_STEPS", "ATMOS_LIGHT_STEPS", "CLOUD_STEPS", "CLOUD_LIGHT_STEPS",
-        "CLOUD_COVERAGE", "OCTAVES", "OCTAVES_SHADOW", "OCTAVES_NORMAL", "SMOOTH_RIDGES", "CLOUDS_HEIGHT",
-        "CLOUDS_THICKNESS", "CAM_HEIGHT", "CAM_SPEED", "SUN_HEIGHT", "SUN_AZIMUTH", "TERRAIN_HEIGHT", "TERRAIN_SCALE",
-        "CLOUD_SCATTERING", "CLOUD_ABSORPTION", "CLOUD_DENSITY", "CLOUD_G_FORWARD", "CLOUD_G_BACKWARD",
+        "LOW_QUALITY",
+        "MAX_RENDERING_DISTANCE",
+        "MAX_MARCHING_STEPS",
+        "MAX_MARCHING_STEPS_SHADOW",
+        "TEXTURE_LOW_QUALITY",
+        "TEXTURE_FILTERING",
+        "FILTERING_SAMPLES",
+        "ATMOS_STEPS",
+        "ATMOS_LIGHT_STEPS",
+        "CLOUD_STEPS",
+        "CLOUD_LIGHT_STEPS",
+        "CLOUD_COVERAGE",
+        "OCTAVES",
+        "OCTAVES_SHADOW",
+        "OCTAVES_NORMAL",
+        "SMOOTH_RIDGES",
+        "CLOUDS_HEIGHT",
+        "CLOUDS_THICKNESS",
+        "CAM_HEIGHT",
+        "CAM_SPEED",
+        "SUN_HEIGHT",
+        "SUN_AZIMUTH",
+        "TERRAIN_HEIGHT",
+        "TERRAIN_SCALE",
+        "CLOUD_SCATTERING",
+        "CLOUD_ABSORPTION",
+        "CLOUD_DENSITY",
+        "CLOUD_G_FORWARD",
+        "CLOUD_G_BACKWARD",
         "CLOUD_BACKWARD_SHARE",
     ];
     let thesis = programs().preset("thesis").unwrap();
     for name in named {
         let key = programs().key(name).unwrap();
         assert!(key.meaning.len() > 10, "{name} has no meaning");
-        assert!(thesis.values.iter().any(|(n, _)| n == name), "thesis.ron lacks {name}");
+        assert!(
+            thesis.values.iter().any(|(n, _)| n == name),
+            "thesis.ron lacks {name}"
+        );
         key.check(key.default).unwrap();
     }
     // Content keys of the picture change it and never make a pipeline; what they do not name stays.
     let view = frozen("V01", 0.0);
-    let mut land = landscape("thesis", "thesis", &[("CLOUD_STEPS", Value::Int(8)), ("SMOOTH_RIDGES", Value::Flag(true))]);
+    let mut land = landscape(
+        "thesis",
+        "thesis",
+        &[
+            ("CLOUD_STEPS", Value::Int(8)),
+            ("SMOOTH_RIDGES", Value::Flag(true)),
+        ],
+    );
     let base = draw(&mut land, &view, SMALL, HDR);
     let layout = programs()
         .get("landscape", &["TERRAIN", "ATMOSPHERE", "CLOUDS"])
@@ -296,7 +362,7 @@ fn row_l38_every_parameter_exists_and_acts() {
         assert_eq!(key.kind, KeyKind::Content, "{name}");
         let old = land.settings().get(&name).unwrap();
         let new = match old {
-            Value::Float(v) if v == 0.0 => Value::Float(0.01),
+            Value::Float(0.0) => Value::Float(0.01),
             Value::Float(v) => Value::Float(v * 0.7),
             Value::Int(v) => Value::Int(v + 1),
             Value::Vec3(v) => Value::Vec3(v.map(|x| x * 0.5)),
@@ -314,16 +380,49 @@ fn row_l38_every_parameter_exists_and_acts() {
 #[test]
 fn row_l39_low_quality_leaves_clouds_out_and_is_twice_as_fast() {
     let low = programs()
-        .get("landscape", &["TERRAIN", "ATMOSPHERE", "LOW_QUALITY", "TEXTURE_LOW_QUALITY"])
-        .or_else(|_| programs().get("landscape", &["TERRAIN", "ATMOSPHERE", "CLOUDS", "LOW_QUALITY", "TEXTURE_LOW_QUALITY"]))
+        .get(
+            "landscape",
+            &[
+                "TERRAIN",
+                "ATMOSPHERE",
+                "LOW_QUALITY",
+                "TEXTURE_LOW_QUALITY",
+            ],
+        )
+        .or_else(|_| {
+            programs().get(
+                "landscape",
+                &[
+                    "TERRAIN",
+                    "ATMOSPHERE",
+                    "CLOUDS",
+                    "LOW_QUALITY",
+                    "TEXTURE_LOW_QUALITY",
+                ],
+            )
+        })
         .unwrap();
-    assert!(!low.stage(StageKind::Fragment).unwrap().wgsl.contains("march_clouds"));
+    assert!(
+        !low.stage(StageKind::Fragment)
+            .unwrap()
+            .wgsl
+            .contains("march_clouds")
+    );
     let view = frozen("V01", 0.0);
     let size = [128, 72];
     let mut normal = landscape("thesis", "thesis", &[]);
     let mut cheap = landscape("thesis_low", "thesis", &[]);
-    let (a, b) = paired(5, || drop(draw(&mut normal, &view, size, HDR)), || drop(draw(&mut cheap, &view, size, HDR)));
-    println!("normal {:.1} ms, low {:.1} ms of CPU at 128x72: {:.2} times", a * 1e3, b * 1e3, a / b);
+    let (a, b) = paired(
+        5,
+        || drop(draw(&mut normal, &view, size, HDR)),
+        || drop(draw(&mut cheap, &view, size, HDR)),
+    );
+    println!(
+        "normal {:.1} ms, low {:.1} ms of CPU at 128x72: {:.2} times",
+        a * 1e3,
+        b * 1e3,
+        a / b
+    );
     assert!(a / b > 1.9, "{}", a / b);
 }
 
@@ -388,7 +487,14 @@ fn nested(dir: vec3<f32>) -> f32 {
         "veduta::terrain::normal::terrain_normal",
         "veduta::terrain::shadow::soft_shadow",
     ];
-    let make = |name: &str| evaluator(&imports, prelude, &format!("{name}(normalize(vec3f(in.f[0], in.f[1], -1.0)))"), 2);
+    let make = |name: &str| {
+        evaluator(
+            &imports,
+            prelude,
+            &format!("{name}(normalize(vec3f(in.f[0], in.f[1], -1.0)))"),
+            2,
+        )
+    };
     let (a, b) = (make("sequential"), make("nested"));
     let mut rows = Vec::new();
     for y in 0..72 {
@@ -398,12 +504,24 @@ fn nested(dir: vec3<f32>) -> f32 {
         }
     }
     let (va, vb) = (a.run(&rows).unwrap(), b.run(&rows).unwrap());
-    let worst = va.iter().zip(&vb).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+    let worst = va
+        .iter()
+        .zip(&vb)
+        .map(|(x, y)| (x - y).abs())
+        .fold(0.0, f64::max);
     assert!(worst < 1e-3, "the layouts disagree by {worst}");
     assert!(va.iter().filter(|v| **v > 0.0).count() > va.len() / 4);
     let (ta, tb) = paired(3, || drop(a.run(&rows)), || drop(b.run(&rows)));
-    println!("march, then shade {:.1} ms; shade inside the march {:.1} ms of CPU: {:.2} times", ta * 1e3, tb * 1e3, tb / ta);
-    assert!(ta < 1.5 * tb, "the sequential layout costs {ta}, the nested one {tb}");
+    println!(
+        "march, then shade {:.1} ms; shade inside the march {:.1} ms of CPU: {:.2} times",
+        ta * 1e3,
+        tb * 1e3,
+        tb / ta
+    );
+    assert!(
+        ta < 1.5 * tb,
+        "the sequential layout costs {ta}, the nested one {tb}"
+    );
 }
 
 #[test]
@@ -413,14 +531,17 @@ fn a_still_frame_uploads_nothing_and_content_makes_no_pipeline() {
     let view = frozen("V01", 0.0);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let mut prepare = |land: &mut Landscape, view: &View| {
-        land.prepare(&gpu.device, &gpu.queue, &mut encoder, view).unwrap()
+        land.prepare(&gpu.device, &gpu.queue, &mut encoder, view)
+            .unwrap()
     };
     let first = prepare(&mut land, &view);
     assert!(first.bytes > 0 && first.bakes == 0 && first.dispatches == 0 && first.draws == 0);
     assert_eq!(prepare(&mut land, &view).bytes, 0);
     let before = land.pipeline().clone();
-    land.set_content("CLOUD_COVERAGE", Value::Float(0.9)).unwrap();
-    land.set_content("TERRAIN_HEIGHT", Value::Float(500.0)).unwrap();
+    land.set_content("CLOUD_COVERAGE", Value::Float(0.9))
+        .unwrap();
+    land.set_content("TERRAIN_HEIGHT", Value::Float(500.0))
+        .unwrap();
     let work = prepare(&mut land, &view);
     assert!(work.bytes > 0 && work.bytes < 1024);
     assert_eq!(&before, land.pipeline(), "content made a new pipeline");
@@ -445,27 +566,95 @@ fn bad_input_gets_a_typed_error() {
         }
     };
     let ok = targets(HDR);
-    fault(new(targets(wgpu::TextureFormat::Depth32Float), Default::default()), &["targets.color_format", "Depth32Float"]);
-    fault(new(targets(wgpu::TextureFormat::R8Unorm), Default::default()), &["three channels"]);
-    fault(new(Targets { sample_count: 3, ..ok }, Default::default()), &["sample_count", "3", "1, 2, 4"]);
-    fault(new(Targets { projection: veduta::landscape::Projection::Orthographic, ..ok }, Default::default()), &["Perspective"]);
-    fault(new(ok, with("CLOUD_STEPS", Value::Int(0))), &["CLOUD_STEPS", "0", "[1, 4096]"]);
-    fault(new(ok, with("CLOUD_COVERAGE", Value::Float(f64::NAN))), &["CLOUD_COVERAGE", "NaN", "[0, 1]"]);
-    fault(new(ok, with("CLOUD_COVERAGE", Value::Flag(true))), &["CLOUD_COVERAGE", "true", "f32"]);
-    fault(new(ok, with("CLOUD_COVERAGES", Value::Int(1))), &["CLOUD_COVERAGES", "did you mean `CLOUD_COVERAGE`"]);
-    fault(new(ok, LandscapeOptions { scene: "moon".into(), ..Default::default() }), &["moon", "`thesis`"]);
-    fault(new(ok, LandscapeOptions { preset: Preset::Named("ultra".into()), ..Default::default() }), &["ultra", "`high`"]);
-    let not_built = programs().get("landscape", &["TERRAIN", "COUNT_OPERATIONS"]).unwrap_err();
-    assert!(matches!(not_built, Error::VariantNotBuilt { .. }), "{not_built}");
+    fault(
+        new(
+            targets(wgpu::TextureFormat::Depth32Float),
+            Default::default(),
+        ),
+        &["targets.color_format", "Depth32Float"],
+    );
+    fault(
+        new(targets(wgpu::TextureFormat::R8Unorm), Default::default()),
+        &["three channels"],
+    );
+    fault(
+        new(
+            Targets {
+                sample_count: 3,
+                ..ok
+            },
+            Default::default(),
+        ),
+        &["sample_count", "3", "1, 2, 4"],
+    );
+    fault(
+        new(
+            Targets {
+                projection: veduta::landscape::Projection::Orthographic,
+                ..ok
+            },
+            Default::default(),
+        ),
+        &["Perspective"],
+    );
+    fault(
+        new(ok, with("CLOUD_STEPS", Value::Int(0))),
+        &["CLOUD_STEPS", "0", "[1, 4096]"],
+    );
+    fault(
+        new(ok, with("CLOUD_COVERAGE", Value::Float(f64::NAN))),
+        &["CLOUD_COVERAGE", "NaN", "[0, 1]"],
+    );
+    fault(
+        new(ok, with("CLOUD_COVERAGE", Value::Flag(true))),
+        &["CLOUD_COVERAGE", "true", "f32"],
+    );
+    fault(
+        new(ok, with("CLOUD_COVERAGES", Value::Int(1))),
+        &["CLOUD_COVERAGES", "did you mean `CLOUD_COVERAGE`"],
+    );
+    fault(
+        new(
+            ok,
+            LandscapeOptions {
+                scene: "moon".into(),
+                ..Default::default()
+            },
+        ),
+        &["moon", "`thesis`"],
+    );
+    fault(
+        new(
+            ok,
+            LandscapeOptions {
+                preset: Preset::Named("ultra".into()),
+                ..Default::default()
+            },
+        ),
+        &["ultra", "`high`"],
+    );
+    let not_built = programs()
+        .get("landscape", &["TERRAIN", "COUNT_OPERATIONS"])
+        .unwrap_err();
+    assert!(
+        matches!(not_built, Error::VariantNotBuilt { .. }),
+        "{not_built}"
+    );
     fault(not_built, &["COUNT_OPERATIONS", "nearest"]);
-    assert!(matches!(programs().get("ocean", &[]).unwrap_err(), Error::UnknownProgram { .. }));
+    assert!(matches!(
+        programs().get("ocean", &[]).unwrap_err(),
+        Error::UnknownProgram { .. }
+    ));
     let mut land = landscape("thesis_low", "thesis", &[]);
     let gpu = gpu();
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let mut refuse = |change: &dyn Fn(&mut View), part: &str| {
         let mut view = View::default();
         change(&mut view);
-        let text = land.prepare(&gpu.device, &gpu.queue, &mut encoder, &view).unwrap_err().to_string();
+        let text = land
+            .prepare(&gpu.device, &gpu.queue, &mut encoder, &view)
+            .unwrap_err()
+            .to_string();
         assert!(text.contains(part), "`{text}` lacks `{part}`");
     };
     refuse(&|v| v.exposure = -1.0, "view.exposure");
@@ -474,7 +663,10 @@ fn bad_input_gets_a_typed_error() {
     refuse(&|v| v.sun.irradiance.x = f32::NAN, "view.sun.irradiance");
     refuse(&|v| v.eye.frac.x = f32::NAN, "view.eye.frac");
     refuse(&|v| v.eye.cell.y = 1 << 40, "altitude");
-    refuse(&|v| v.projection = veduta::glam::Mat4::ZERO, "view.projection");
+    refuse(
+        &|v| v.projection = veduta::glam::Mat4::ZERO,
+        "view.projection",
+    );
     refuse(&|v| v.jitter.x = 3.0, "view.jitter");
 }
 
@@ -487,12 +679,16 @@ fn every_colour_format_gets_its_own_output() {
         HDR,
     ];
     let [unorm, srgb, hdr] = formats.map(|format| {
-        let mut land =
-            Landscape::new(&gpu().device, programs(), &targets(format), &LandscapeOptions {
+        let mut land = Landscape::new(
+            &gpu().device,
+            programs(),
+            &targets(format),
+            &LandscapeOptions {
                 preset: Preset::ThesisLow,
                 ..Default::default()
-            })
-            .unwrap();
+            },
+        )
+        .unwrap();
         draw(&mut land, &view, SMALL, format)
     });
     let mut worst = 0.0_f32;
@@ -509,8 +705,14 @@ fn every_colour_format_gets_its_own_output() {
             worst = worst.max((a[c] - encoded).abs());
         }
     }
-    println!("largest difference from the encoded tone map: {:.3} of a step", worst * 255.0);
-    assert!(worst * 255.0 < 1.05, "dither moves by half a step and rounding by another");
+    println!(
+        "largest difference from the encoded tone map: {:.3} of a step",
+        worst * 255.0
+    );
+    assert!(
+        worst * 255.0 < 1.05,
+        "dither moves by half a step and rounding by another"
+    );
 }
 
 #[test]
@@ -538,10 +740,13 @@ fn row_w04_an_edit_shows_without_a_restart_and_a_bad_file_keeps_the_old_one() {
         let target: wgpu::ColorTargetState = HDR.into();
         let ready = reloader
             .current()
-            .pipeline(&gpu().device, &veduta::program::PipelineOptions {
-                targets: &[Some(target)],
-                ..Default::default()
-            })
+            .pipeline(
+                &gpu().device,
+                &veduta::program::PipelineOptions {
+                    targets: &[Some(target)],
+                    ..Default::default()
+                },
+            )
             .unwrap();
         let picture = crate::common::draw_with([4, 4], HDR, |pass| {
             pass.set_pipeline(ready.render().unwrap());
@@ -557,8 +762,29 @@ fn row_w04_an_edit_shows_without_a_restart_and_a_bad_file_keeps_the_old_one() {
     paint("vec4<f32>(0.0, 1.0, 0.0)");
     let fault = reloader.poll().unwrap_err().to_string();
     assert!(fault.contains("paint.sp:8:"), "{fault}");
-    assert_eq!(color(&reloader), [0.0, 1.0, 0.0, 1.0], "the old program stays");
+    assert_eq!(
+        color(&reloader),
+        [0.0, 1.0, 0.0, 1.0],
+        "the old program stays"
+    );
     paint("vec4<f32>(0.0, 0.0, 1.0, 1.0)");
     assert!(reloader.poll().unwrap());
     assert_eq!(color(&reloader), [0.0, 0.0, 1.0, 1.0]);
+}
+
+#[test]
+fn a_feature_that_a_program_never_mentions_makes_no_difference() {
+    let with = programs()
+        .get(
+            "landscape",
+            &["TERRAIN", "ATMOSPHERE", "A_FLAG_OF_ANOTHER_PROGRAM"],
+        )
+        .unwrap();
+    assert_eq!(
+        with,
+        programs()
+            .get("landscape", &["TERRAIN", "ATMOSPHERE"])
+            .unwrap()
+    );
+    assert!(with.mentions.iter().any(|m| m == "COUNT_OPERATIONS"));
 }

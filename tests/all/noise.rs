@@ -6,6 +6,9 @@ use crate::sweep::{
 };
 use veduta::reference::noise::*;
 
+/// A lattice position as the twins give it.
+type Place = ([i32; 3], [f64; 3]);
+
 const ONE_NOISE: f64 = 2e-6;
 const ARGS_2D: &str = "vec2i(in.i[0], in.i[1]), vec2f(in.f[2], in.f[3]), in.u[4]";
 const ARGS_3D: &str = "vec3i(in.i[0], in.i[1], in.i[2]), vec3f(in.f[3], in.f[4], in.f[5]), in.u[6]";
@@ -98,10 +101,7 @@ fn lattice_positions_on_the_device_equal_their_twins() {
         row[7] = random.bits() as u32 % 22;
     }
     // The place as one number, axis by axis: a fraction rounded up to a whole cell counts as that cell.
-    let check = |name: &str,
-                 arguments: &str,
-                 twin: &dyn Fn(&[u32]) -> ([i32; 3], [f64; 3]),
-                 bound: f64| {
+    let check = |name: &str, arguments: &str, twin: &dyn Fn(&[u32]) -> Place, bound: f64| {
         let import = format!("veduta::noise::lattice::{name}");
         let mut worst = 0.0_f64;
         for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {

@@ -3,7 +3,7 @@
 //! symbols  relative position relative to the eye [m] · altitude [m] · density relative to a full cloud [1]
 #define_import_path veduta::clouds::field
 
-#import veduta::fractal::fbm::{fbm_value_3d_periodic}
+#import veduta::fractal::fbm::{fbm_value_3d_periodic_six}
 
 /// The period that stands for none: 2^20 cells, which eleven octaves still hold.
 const NO_PERIOD: i32 = 1048576;
@@ -18,8 +18,6 @@ struct CloudLayer {
     wavelength: f32,
     /// Period of the lattice on every axis [cells]; 0: none (see NO_PERIOD).
     period: i32,
-    /// Octaves of the noise.
-    octaves: i32,
     /// Hurst exponent of the noise.
     hurst: f32,
     /// Altitude of the lower sphere [m].
@@ -68,7 +66,7 @@ fn shape_coverage(n: f32, coverage: f32, uniformity: f32) -> f32 {
 fn cloud_density(layer: CloudLayer, relative: vec3<f32>, altitude: f32) -> f32 {
     let place = layer.frac + vec3<f32>(relative.x, altitude, relative.z) / layer.wavelength;
     let period = select(NO_PERIOD, layer.period, layer.period > 0);
-    let n = fbm_value_3d_periodic(layer.cell, place, vec3<i32>(period), layer.octaves, layer.hurst, layer.seed);
+    let n = fbm_value_3d_periodic_six(layer.cell, place, vec3<i32>(period), layer.hurst, layer.seed);
     let inside = altitude >= layer.bottom && altitude <= layer.bottom + layer.thickness;
     return select(0.0, shape_coverage(n, layer.coverage, layer.uniformity), inside);
 }

@@ -15,8 +15,8 @@
 /// domain  hurst in [0, 2] 1 lin
 /// domain  offset in [0, 1] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
-/// range   [-16, 32] 1
-/// error   1e-5 abs of reference::fractal::hybrid_multifractal_2d
+/// range   [-5000, 32] 1
+/// error   3e-5 abs of reference::fractal::hybrid_multifractal_2d
 /// source  Leitner2022 alg. 2
 fn hybrid_multifractal_2d(
     cell: vec2<i32>,
@@ -53,8 +53,8 @@ fn hybrid_multifractal_2d(
 /// domain  hurst in [0, 2] 1 lin
 /// domain  offset in [0, 1] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
-/// range   [-1e6, 1e6] 1
-/// error   0.2 abs of reference::fractal::hybrid_multifractal_2d_slope
+/// range   [-inf, inf] 1
+/// error   0.4 abs of reference::fractal::hybrid_multifractal_2d_slope
 /// source  Leitner2022 alg. 2
 fn hybrid_multifractal_2d_slope(
     cell: vec2<i32>,

@@ -3,10 +3,10 @@
 //! The cell is an integer and the fraction small, so that a noise is as exact at cell 100 000 000 as at 0. Cells wrap at
 //! 2^32.
 //!
-//! Octave 0 of a fractal lies at p, octave i at 2^i p + d. Without the shift d all octaves would share the lattice points of the first one,
-//! where gradient noise is 0 and value noise flat. d is made of odd multiples of 1/64: a lattice point n of octave i lies at
-//! 2^k n - (2^k - 1) d of octave i + k, which is no whole number. The multiples are those that keep it farthest from one:
-//! a third of a cell in 2D, 0.44 in 3D, for all k.
+//! Octave 0 of a fractal lies at p, octave i at 2^i p + d. Without the shift d all octaves would share the lattice points
+//! of the first one, where gradient noise is 0 and value noise flat. d is made of odd multiples of 1/64, so that a lattice
+//! point n of octave 0 lies at 2^k n + d of octave k, and one of octave i at 2^k n - (2^k - 1) d of octave i + k: never a
+//! whole number. The multiples are those that keep it farthest from one: a third of a cell in 2D, 0.44 in 3D, for all k.
 //!
 //! source   Perlin2002 Improving noise (quintic fade)
 //! symbols  cell lattice point [cell] · frac position within the cell [cell] · i octave [1]
@@ -212,7 +212,7 @@ fn wrap_3d(cell: vec3<i32>, period: vec3<i32>) -> vec3<i32> {
 ///
 /// domain  t in [0, 1] 1 lin
 /// range   [0, 1] 1
-/// error   2e-7 abs of reference::noise::fade
+/// error   1e-7 abs of reference::noise::fade
 /// source  Perlin2002
 fn fade_2d(t: vec2<f32>) -> vec2<f32> {
     let s = t - 0.5;
@@ -224,7 +224,7 @@ fn fade_2d(t: vec2<f32>) -> vec2<f32> {
 ///
 /// domain  t in [0, 1] 1 lin
 /// range   [0, 1] 1
-/// error   2e-7 abs of reference::noise::fade
+/// error   1e-7 abs of reference::noise::fade
 /// source  Perlin2002
 fn fade_3d(t: vec3<f32>) -> vec3<f32> {
     let s = t - 0.5;

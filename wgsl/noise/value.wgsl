@@ -46,7 +46,7 @@ fn value_between_3d(low: vec3<i32>, high: vec3<i32>, frac: vec3<f32>, seed: u32)
 /// domain  frac in [0, 1] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [0, 1] 1
-/// error   5e-7 abs of reference::noise::value_noise_2d
+/// error   4e-7 abs of reference::noise::value_noise_2d
 /// source  Leitner2022 3.6
 fn value_noise_2d(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> f32 {
     let p = split_2d(cell, frac);
@@ -64,7 +64,7 @@ fn value_noise_2d(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> f32 {
 /// domain  frac in [0, 1] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [0, 1] 1
-/// error   5e-7 abs of reference::noise::value_noise_3d
+/// error   4e-7 abs of reference::noise::value_noise_3d
 /// source  Leitner2022 3.6
 fn value_noise_3d(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
     let p = split_3d(cell, frac);
@@ -78,7 +78,7 @@ fn value_noise_3d(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
 /// domain  period in [1, 1073741824] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [0, 1] 1
-/// error   5e-7 abs of reference::noise::value_noise_3d_periodic
+/// error   4e-7 abs of reference::noise::value_noise_3d_periodic
 /// source  Leitner2022 3.6; departs: periodic lattice
 fn value_noise_3d_periodic(cell: vec3<i32>, frac: vec3<f32>, period: vec3<i32>, seed: u32) -> f32 {
     let p = split_3d(cell, frac);

@@ -206,7 +206,8 @@ fn sunlight(altitude: f32, mu: f32) -> vec3<f32> {
 
 // Light on a surface at a point with the zenith cosine `mu` of the sun, for an irradiance of 1.
 fn three_lights(altitude: f32, mu: f32) -> ThreeLights {
-    let sky = sunlight(SKY_LIGHT_ALTITUDE, mu);
+    // The sky's light: red as the sun that it comes from, and gone when the sun is six degrees below the horizon.
+    let sky = sunlight(SKY_LIGHT_ALTITUDE, mu) * smoothstep(-0.1, 0.35, mu);
     return ThreeLights(content.sun_light * sunlight(altitude, mu), content.sky_light * sky, content.bounce_light * sky);
 }
 
@@ -316,8 +317,8 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
 #endif
 #ifdef CLOUDS
 #ifndef LOW_QUALITY
-    let layer = CloudLayer(anchors.cloud_cell, anchors.cloud_frac, content.cloud_scale, content.cloud_period,
-        CLOUD_OCTAVES, 1.0, content.clouds_height, content.clouds_thickness, content.cloud_coverage, 0.0,
+    let layer = CloudLayer(anchors.cloud_cell, anchors.cloud_frac, content.cloud_scale, content.cloud_period, 1.0,
+        content.clouds_height, content.clouds_thickness, content.cloud_coverage, 0.0,
         content.cloud_density * (content.cloud_scattering + content.cloud_absorption),
         content.cloud_scattering / max(content.cloud_scattering + content.cloud_absorption, 1e-20),
         content.cloud_g_forward, content.cloud_g_backward, content.cloud_backward_share, content.cloud_seed);

@@ -10,6 +10,8 @@ use crate::{Fault, Options, driver};
 
 const PRESETS: [&str; 2] = ["thesis", "thesis_low"];
 const SIZE: &str = "800x450";
+/// Two thirds sky, as in the pictures of the thesis.
+const VIEW: &str = "V01";
 
 /// Sets up, builds and renders.
 pub fn run(options: &Options) -> Result<(), Fault> {
@@ -34,9 +36,11 @@ pub fn run(options: &Options) -> Result<(), Fault> {
         let picture = out.join(format!("{preset}.png"));
         let time = Instant::now();
         run_command(
-            Command::new(&paths.veduta)
+            driver::quiet(&mut Command::new(&paths.veduta), &paths)
                 .current_dir(&paths.root)
-                .args(["render", "--preset", preset, "--size", SIZE, "--out"])
+                .args([
+                    "render", "--preset", preset, "--view", VIEW, "--size", SIZE, "--out",
+                ])
                 .arg(&picture),
         )?;
         let bytes = fs::metadata(&picture)

@@ -102,6 +102,20 @@ pub fn build_command_line(paths: &Paths) -> Result<(), Fault> {
     ]))
 }
 
+/// Gives a command that opens adapters a runtime folder where the session has none: without one, the OpenGL driver prints
+/// an error for every adapter that it opens, which has no other effect.
+pub fn quiet<'a>(command: &'a mut Command, paths: &Paths) -> &'a mut Command {
+    const NAME: &str = "XDG_RUNTIME_DIR";
+    let folder = paths.target.join("tmp").join("runtime");
+    if cfg!(target_os = "linux")
+        && env::var_os(NAME).is_none()
+        && std::fs::create_dir_all(&folder).is_ok()
+    {
+        command.env(NAME, folder);
+    }
+    command
+}
+
 fn adapters(paths: &Paths) -> Option<String> {
     let list = answer(Command::new(&paths.veduta).args(["list", "adapters", "--json"]))?;
     list.contains("\"name\"").then_some(list)

@@ -80,7 +80,7 @@ fn summary(rows: &[Row], total: Duration, skipped: &[String]) -> String {
 
 fn carry_out(step: &Step, paths: &Paths, variables: &[&Variable]) -> (Counts, Result<(), Fault>) {
     let mut command = Command::new(&paths.cargo);
-    command
+    driver::quiet(&mut command, paths)
         .current_dir(&paths.root)
         .args(step.arguments.split_whitespace());
     for variable in variables {

@@ -201,14 +201,17 @@ pub fn compose(args: &ComposeArgs) -> Result<(Composed, Settings), CliError> {
             .map(|scene| scene.name.clone()),
     };
     let scene = scene.and_then(|name| catalog.scene_of(&name).cloned());
-    if let Some(scene) = &scene {
-        if scene.program != name {
-            return Err(CliError::argument(
-                "--scene",
-                &scene.name,
-                format!("a scene of the program `{name}`, not of `{}`", scene.program),
-            ));
-        }
+    if let Some(scene) = &scene
+        && scene.program != name
+    {
+        return Err(CliError::argument(
+            "--scene",
+            &scene.name,
+            format!(
+                "a scene of the program `{name}`, not of `{}`",
+                scene.program
+            ),
+        ));
     }
     let preset = match &args.preset {
         Some(preset) => catalog.preset(preset)?.name(catalog.set()).to_owned(),

@@ -85,11 +85,7 @@ pub fn to_json(fault: &Diag) -> serde_json::Value {
 ///
 /// # Errors
 /// [`CliError::Missing`] and [`CliError::Read`] for paths; faults inside the files are the report's.
-pub fn check(
-    paths: &[PathBuf],
-    sources: &SourceArgs,
-    headers: bool,
-) -> Result<Report, CliError> {
+pub fn check(paths: &[PathBuf], sources: &SourceArgs, headers: bool) -> Result<Report, CliError> {
     let mut faults = Diags::new();
     let own = collect(paths, &mut faults)?;
     let mut all = Texts::load(sources)?;
@@ -114,9 +110,9 @@ pub fn check(
             report.faults.push(fault);
         }
     }
-    report.faults.sort_by(|a, b| {
-        (&a.file, a.line, a.column).cmp(&(&b.file, b.line, b.column))
-    });
+    report
+        .faults
+        .sort_by(|a, b| (&a.file, a.line, a.column).cmp(&(&b.file, b.line, b.column)));
     Ok(report)
 }
 

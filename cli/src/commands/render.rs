@@ -32,7 +32,12 @@ pub struct RenderArgs {
     #[arg(long, default_value = "800x450", value_name = "WxH")]
     pub size: Option<Size>,
     /// Seconds of flight, at CAM_SPEED in the direction of the view's yaw
-    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true, value_name = "S")]
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        allow_hyphen_values = true,
+        value_name = "S"
+    )]
     pub time: f64,
     /// The eye in metres, Y being the altitude; replaces the view's place and height
     #[arg(long, allow_hyphen_values = true, value_name = "X,Y,Z", value_parser = parse_numbers::<3>)]
@@ -59,7 +64,13 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N")]
     pub frames: Option<u32>,
     /// Frames a second
-    #[arg(long, default_value_t = 25.0, requires = "frames", allow_hyphen_values = true, value_name = "F")]
+    #[arg(
+        long,
+        default_value_t = 25.0,
+        requires = "frames",
+        allow_hyphen_values = true,
+        value_name = "F"
+    )]
     pub fps: f64,
     /// Where shaders, scenes, presets and views come from.
     #[command(flatten)]
@@ -397,20 +408,12 @@ impl Job {
         job.options
             .values
             .push(("COUNT_OPERATIONS".to_owned(), Value::Flag(true)));
-        job.settings.set(
-            self.catalog.set(),
-            "COUNT_OPERATIONS",
-            Value::Flag(true),
-        )?;
+        job.settings
+            .set(self.catalog.set(), "COUNT_OPERATIONS", Value::Flag(true))?;
         let (program, _) = self.names()?;
         job.catalog.ensure(&program, &job.settings)?;
-        let mut renderer = Renderer::new(
-            gpu,
-            job.catalog.set(),
-            &job.options,
-            size,
-            Output::Linear,
-        )?;
+        let mut renderer =
+            Renderer::new(gpu, job.catalog.set(), &job.options, size, Output::Linear)?;
         renderer.draw(&job.view(time, size)?, Tiling::Adaptive, &mut |_| {})?;
         Ok(operation_counts(&renderer.read_rgba32()?))
     }

@@ -36,7 +36,10 @@ fn run(fixture: &str) -> (Run, PathBuf) {
 fn the_job_passes_a_good_project() {
     let (run, dir) = run("good");
     run.good();
-    assert_eq!(crate::common::json(&dir.join("lint.json")), serde_json::json!([]));
+    assert_eq!(
+        crate::common::json(&dir.join("lint.json")),
+        serde_json::json!([])
+    );
 }
 
 #[test]

@@ -62,7 +62,10 @@ fn a_module_function_agrees_with_its_twin() {
         // The device sees the row rounded to f32.
         let [mu, g] = [row[0], row[1]].map(|x| f64::from(x as f32));
         let twin = veduta::reference::phase::phase_henyey_greenstein(mu, g);
-        assert!((f64::from(value) - twin).abs() < 2e-6 * twin, "{row:?}: {value} {twin}");
+        assert!(
+            (f64::from(value) - twin).abs() < 2e-6 * twin,
+            "{row:?}: {value} {twin}"
+        );
     }
 }
 
@@ -74,18 +77,37 @@ fn integers_and_vectors_go_through_npy() {
     let eval = |expression: &str, out: &str| {
         veduta(
             &dir,
-            &["eval", "--expr", expression, "--columns", "i,u", "--in", "rows.npy", "--out", out],
+            &[
+                "eval",
+                "--expr",
+                expression,
+                "--columns",
+                "i,u",
+                "--in",
+                "rows.npy",
+                "--out",
+                out,
+            ],
         )
         .good();
     };
     eval("vec3<i32>(in.i[0], in.i[0] + 1, -7)", "v.npy");
     let (shape, values) = read_npy::<i64>(&dir.join("v.npy"));
     assert_eq!(shape, [3, 3]);
-    assert_eq!(values, [1, 2, -7, -2, -1, -7, -2_147_483_648, -2_147_483_647, -7]);
+    assert_eq!(
+        values,
+        [1, 2, -7, -2, -1, -7, -2_147_483_648, -2_147_483_647, -7]
+    );
     eval("in.u[1]", "u.npy");
-    assert_eq!(read_npy::<i64>(&dir.join("u.npy")), (vec![3], vec![4_294_967_295, 7, 0]));
+    assert_eq!(
+        read_npy::<i64>(&dir.join("u.npy")),
+        (vec![3], vec![4_294_967_295, 7, 0])
+    );
     eval("in.i[0] < 0", "b.npy");
-    assert_eq!(read_npy::<i64>(&dir.join("b.npy")), (vec![3], vec![0, 1, 1]));
+    assert_eq!(
+        read_npy::<i64>(&dir.join("b.npy")),
+        (vec![3], vec![0, 1, 1])
+    );
     eval("vec2<f32>(f32(in.i[0]), 0.5)", "f.csv");
     assert_eq!(
         std::fs::read_to_string(dir.join("f.csv")).unwrap(),
@@ -105,10 +127,24 @@ fn expressions_without_a_column_have_values() {
     ] {
         veduta(
             &dir,
-            &["eval", "--expr", expression, "--columns", "f", "--in", "rows.csv", "--out", "out.csv"],
+            &[
+                "eval",
+                "--expr",
+                expression,
+                "--columns",
+                "f",
+                "--in",
+                "rows.csv",
+                "--out",
+                "out.csv",
+            ],
         )
         .good();
-        assert_eq!(std::fs::read_to_string(dir.join("out.csv")).unwrap(), wanted, "{expression}");
+        assert_eq!(
+            std::fs::read_to_string(dir.join("out.csv")).unwrap(),
+            wanted,
+            "{expression}"
+        );
     }
 }
 
@@ -118,7 +154,12 @@ fn one_dimension_no_rows_and_every_type_are_read() {
     write_npy(&dir.join("one.npy"), &[3], &[0.5_f32, -1.0, f32::INFINITY]);
     write_npy(&dir.join("none.npy"), &[0, 1], &[0.0_f64; 0]);
     // Fortran order says nothing about one column.
-    write_npy_order(&dir.join("column.npy"), &[2, 1], &[1.0_f64, 2.0], npyz::Order::Fortran);
+    write_npy_order(
+        &dir.join("column.npy"),
+        &[2, 1],
+        &[1.0_f64, 2.0],
+        npyz::Order::Fortran,
+    );
     for (name, wanted) in [
         ("one", vec![0.5, -1.0, f32::INFINITY]),
         ("none", vec![]),
@@ -127,7 +168,17 @@ fn one_dimension_no_rows_and_every_type_are_read() {
         let input = format!("{name}.npy");
         veduta(
             &dir,
-            &["eval", "--expr", "in.f[0]", "--columns", "f", "--in", &input, "--out", "out.npy"],
+            &[
+                "eval",
+                "--expr",
+                "in.f[0]",
+                "--columns",
+                "f",
+                "--in",
+                &input,
+                "--out",
+                "out.npy",
+            ],
         )
         .good();
         let (shape, values) = read_npy::<f32>(&dir.join("out.npy"));
@@ -138,12 +189,34 @@ fn one_dimension_no_rows_and_every_type_are_read() {
 #[test]
 fn csv_round_trips_floats() {
     let dir = folder("eval_csv");
-    let texts = ["0.1", "-0.0", "3.4028235e38", "1e-37", "16777217", "NaN", "-inf", "123456.79"];
-    let input = format!("# a comment\nvalue, twice\n{}", texts.map(|t| format!("{t}, 2\n")).join(""));
+    let texts = [
+        "0.1",
+        "-0.0",
+        "3.4028235e38",
+        "1e-37",
+        "16777217",
+        "NaN",
+        "-inf",
+        "123456.79",
+    ];
+    let input = format!(
+        "# a comment\nvalue, twice\n{}",
+        texts.map(|t| format!("{t}, 2\n")).join("")
+    );
     std::fs::write(dir.join("rows.csv"), input).unwrap();
     veduta(
         &dir,
-        &["eval", "--expr", "in.f[0]", "--columns", "f,i", "--in", "rows.csv", "--out", "out.csv"],
+        &[
+            "eval",
+            "--expr",
+            "in.f[0]",
+            "--columns",
+            "f,i",
+            "--in",
+            "rows.csv",
+            "--out",
+            "out.csv",
+        ],
     )
     .good();
     let out = std::fs::read_to_string(dir.join("out.csv")).unwrap();
@@ -167,17 +240,37 @@ fn preludes_and_own_modules_are_taken() {
         "//! Doubling.\n//! source   ours\n#define_import_path own::double\n\n/// Twice the argument.\n///\n/// domain  x in [-1e6, 1e6] 1 lin\n/// range   [-2e6, 2e6] 1\n/// source  ours\nfn double(x: f32) -> f32 {\n    return 2.0 * x;\n}\n",
     )
     .unwrap();
-    std::fs::write(dir.join("prelude.wgsl"), "fn third(x: f32) -> f32 { return double(x) / 6.0; }\n").unwrap();
+    std::fs::write(
+        dir.join("prelude.wgsl"),
+        "fn third(x: f32) -> f32 { return double(x) / 6.0; }\n",
+    )
+    .unwrap();
     std::fs::write(dir.join("rows.csv"), "3\n-6\n").unwrap();
     veduta(
         &dir,
         &[
-            "eval", "--modules", "lib", "--prelude", "prelude.wgsl", "--import", "own::double::double", "--expr", "third(in.f[0])",
-            "--columns", "f", "--in", "rows.csv", "--out", "out.csv",
+            "eval",
+            "--modules",
+            "lib",
+            "--prelude",
+            "prelude.wgsl",
+            "--import",
+            "own::double::double",
+            "--expr",
+            "third(in.f[0])",
+            "--columns",
+            "f",
+            "--in",
+            "rows.csv",
+            "--out",
+            "out.csv",
         ],
     )
     .good();
-    assert_eq!(std::fs::read_to_string(dir.join("out.csv")).unwrap(), "1.0\n-2.0\n");
+    assert_eq!(
+        std::fs::read_to_string(dir.join("out.csv")).unwrap(),
+        "1.0\n-2.0\n"
+    );
 }
 
 #[test]
@@ -185,16 +278,30 @@ fn faults_of_the_expression_are_told() {
     let dir = folder("eval_faults");
     std::fs::write(dir.join("rows.csv"), "3\n").unwrap();
     let eval = |extra: &[&str]| {
-        let mut args = vec!["eval", "--columns", "f", "--in", "rows.csv", "--out", "out.csv"];
+        let mut args = vec![
+            "eval",
+            "--columns",
+            "f",
+            "--in",
+            "rows.csv",
+            "--out",
+            "out.csv",
+        ];
         args.extend(extra);
         veduta(&dir, &args)
     };
     eval(&["--expr", "in.f[0] +"]).bad(1, &["expression:"]);
     eval(&["--expr", "mat2x2<f32>(in.f[0], 1.0, 2.0, 3.0)"]).bad(1, &["scalar or a vector"]);
     eval(&["--expr", "nois(in.f[0])"]).bad(1, &["nois"]);
-    eval(&["--expr", "1.0", "--import", "veduta::lighting::phase::phase_rayleig"])
-        .bad(1, &["phase_rayleig", "did you mean `phase_rayleigh`"]);
-    eval(&["--expr", "1.0", "--prelude", "nowhere.wgsl"]).bad(1, &["nowhere.wgsl", "cannot be read"]);
+    eval(&[
+        "--expr",
+        "1.0",
+        "--import",
+        "veduta::lighting::phase::phase_rayleig",
+    ])
+    .bad(1, &["phase_rayleig", "did you mean `phase_rayleigh`"]);
+    eval(&["--expr", "1.0", "--prelude", "nowhere.wgsl"])
+        .bad(1, &["nowhere.wgsl", "cannot be read"]);
     assert!(!dir.join("out.csv").exists());
 }
 
@@ -204,11 +311,29 @@ fn faults_of_the_rows_are_told() {
     let eval = |columns: &str, input: &str| {
         veduta(
             &dir,
-            &["eval", "--expr", "1.0f", "--columns", columns, "--in", input, "--out", "out.npy"],
+            &[
+                "eval",
+                "--expr",
+                "1.0f",
+                "--columns",
+                columns,
+                "--in",
+                input,
+                "--out",
+                "out.npy",
+            ],
         )
     };
     write_npy(&dir.join("f64.npy"), &[2, 2], &[1.0_f64, 2.0, 3.0, 0.5]);
-    eval("f,i", "f64.npy").bad(1, &["f64.npy: row 1, column 1", "is 0.5", "type i", "whole number"]);
+    eval("f,i", "f64.npy").bad(
+        1,
+        &[
+            "f64.npy: row 1, column 1",
+            "is 0.5",
+            "type i",
+            "whole number",
+        ],
+    );
     eval("f", "f64.npy").bad(1, &["shape is (2, 2)", "(rows, 1)"]);
     eval("f,f,f", "f64.npy").bad(1, &["shape is (2, 2)", "(rows, 3)"]);
     eval("f,x", "f64.npy").bad(1, &["f,x", "1 to 16 of i, u, f"]);
@@ -221,7 +346,12 @@ fn faults_of_the_rows_are_told() {
     eval("i", "i32.npy").bad(1, &["<i4", "float32, float64 or int64"]);
     write_npy(&dir.join("cube.npy"), &[1, 1, 1], &[0.0_f32]);
     eval("f", "cube.npy").bad(1, &["shape is (1, 1, 1)"]);
-    write_npy_order(&dir.join("fortran.npy"), &[2, 2], &[0.0_f32; 4], npyz::Order::Fortran);
+    write_npy_order(
+        &dir.join("fortran.npy"),
+        &[2, 2],
+        &[0.0_f32; 4],
+        npyz::Order::Fortran,
+    );
     eval("f,f", "fortran.npy").bad(1, &["Fortran order"]);
     let bytes = std::fs::read(dir.join("f64.npy")).unwrap();
     std::fs::write(dir.join("short.npy"), &bytes[..bytes.len() - 1]).unwrap();
@@ -244,7 +374,17 @@ fn faults_of_the_rows_are_told() {
     std::fs::write(dir.join("good.csv"), "1\n").unwrap();
     veduta(
         &dir,
-        &["eval", "--expr", "1.0f", "--columns", "f", "--in", "good.csv", "--out", "no/out.npy"],
+        &[
+            "eval",
+            "--expr",
+            "1.0f",
+            "--columns",
+            "f",
+            "--in",
+            "good.csv",
+            "--out",
+            "no/out.npy",
+        ],
     )
     .bad(1, &["no/out.npy", "its folder does not exist"]);
 }

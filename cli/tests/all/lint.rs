@@ -37,19 +37,29 @@ fn every_fault_has_its_place() {
         ("shaders/hills.wgsl", "fbm_2}", "fbm_2"),
         ("shaders/map.sp", "TERRACE", "TERRACE"),
     ] {
-        let found = faults.iter().find(|f| {
-            f["file"] == file && f["message"].as_str().unwrap().contains(word)
-        });
+        let found = faults
+            .iter()
+            .find(|f| f["file"] == file && f["message"].as_str().unwrap().contains(word));
         let fault = found.unwrap_or_else(|| panic!("no fault of {word} in {faults:#?}"));
         let text = std::fs::read_to_string(dir.join(file)).unwrap();
-        let line = text.lines().nth(fault["line"].as_u64().unwrap() as usize - 1).unwrap();
+        let line = text
+            .lines()
+            .nth(fault["line"].as_u64().unwrap() as usize - 1)
+            .unwrap();
         assert_eq!(fault["source"], line);
-        let rest: String = line.chars().skip(fault["column"].as_u64().unwrap() as usize - 1).collect();
+        let rest: String = line
+            .chars()
+            .skip(fault["column"].as_u64().unwrap() as usize - 1)
+            .collect();
         assert!(rest.starts_with(at), "{fault} points at {rest}");
     }
     let text = veduta(&dir, &["lint", "shaders", "presets"]).bad(1, &["faults found"]);
     assert!(text.out.contains("shaders/hills.wgsl:4:"), "{}", text.out);
-    assert!(text.out.contains("#import veduta::fractal::fbm::{fbm_2}\n"), "{}", text.out);
+    assert!(
+        text.out.contains("#import veduta::fractal::fbm::{fbm_2}\n"),
+        "{}",
+        text.out
+    );
 }
 
 #[test]
@@ -59,18 +69,29 @@ fn variants_are_composed() {
     // Broken only when the flag is on.
     let path = dir.join("shaders/map.sp");
     let text = std::fs::read_to_string(&path).unwrap();
-    let broken = text.replace("height = floor(8.0 * height) / 8.0;", "height = flor(8.0 * height) / 8.0;");
+    let broken = text.replace(
+        "height = floor(8.0 * height) / 8.0;",
+        "height = flor(8.0 * height) / 8.0;",
+    );
     assert_ne!(text, broken);
     std::fs::write(&path, broken).unwrap();
     let run = veduta(&dir, &["lint", "shaders", "presets"]).bad(1, &["1 fault found"]);
-    assert!(run.out.contains("shaders/map.sp:22:") && run.out.contains("flor"), "{}", run.out);
+    assert!(
+        run.out.contains("shaders/map.sp:21:") && run.out.contains("flor"),
+        "{}",
+        run.out
+    );
     assert!(run.out.contains("TERRACES"), "{}", run.out);
 }
 
 #[test]
 fn what_ships_has_no_fault() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let run = veduta(&root, &["lint", "--no-shipped", "--headers", "wgsl", "presets"]).good();
+    let run = veduta(
+        &root,
+        &["lint", "--no-shipped", "--headers", "wgsl", "presets"],
+    )
+    .good();
     assert_eq!(run.out, "");
 }
 
@@ -86,19 +107,34 @@ fn paths_and_files_of_others() {
     assert!(run.out.contains("window.ron: is neither"), "{}", run.out);
     std::fs::write(dir.join("latin.wgsl"), b"// caf\xe9\n").unwrap();
     let run = veduta(&dir, &["lint", "."]).bad(1, &["1 fault"]);
-    assert!(run.out.contains("latin.wgsl: is not UTF-8 after byte 6"), "{}", run.out);
+    assert!(
+        run.out.contains("latin.wgsl: is not UTF-8 after byte 6"),
+        "{}",
+        run.out
+    );
 }
 
 #[test]
 fn broken_keys_and_clashes_are_told() {
     let dir = folder("lint_keys");
     copy_fixture("user_project/good", &dir);
-    std::fs::copy(dir.join("presets/scenes/dusk.ron"), dir.join("presets/scenes/thesis.ron")).unwrap();
+    std::fs::copy(
+        dir.join("presets/scenes/dusk.ron"),
+        dir.join("presets/scenes/thesis.ron"),
+    )
+    .unwrap();
     let run = veduta(&dir, &["lint", "."]).bad(1, &["fault"]);
     assert!(run.out.contains("a second scene `thesis`"), "{}", run.out);
     let keys = dir.join("presets/keys.ron");
-    let text = std::fs::read_to_string(&keys).unwrap().replace("TERRACES", "CLOUDS");
+    let text = std::fs::read_to_string(&keys)
+        .unwrap()
+        .replace("TERRACES", "CLOUDS");
     std::fs::write(&keys, text).unwrap();
     let run = veduta(&dir, &["lint", "."]).bad(1, &["fault"]);
-    assert!(run.out.contains("presets/keys.ron:2:12: key `CLOUDS` is declared twice"), "{}", run.out);
+    assert!(
+        run.out
+            .contains("presets/keys.ron:2:12: key `CLOUDS` is declared twice"),
+        "{}",
+        run.out
+    );
 }

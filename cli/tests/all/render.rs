@@ -34,13 +34,21 @@ fn every_result_of_one_frame() {
     let run = veduta(
         &dir,
         &[
-            "render", "--preset", "thesis", "--view", "V01", "--size", "64x36", "--out", "a.png", "--linear", "a.exr", "--stats",
-            "s.json", "--count", "c.json",
+            "render", "--preset", "thesis", "--view", "V01", "--size", "64x36", "--out", "a.png",
+            "--linear", "a.exr", "--stats", "s.json", "--count", "c.json",
         ],
     )
     .good();
-    assert!(run.out.contains("a.png: 64x36 in ") && run.out.contains("a.exr: 64x36 in "), "{}", run.out);
-    assert!(!run.err.contains('%'), "a progress bar without a terminal: {}", run.err);
+    assert!(
+        run.out.contains("a.png: 64x36 in ") && run.out.contains("a.exr: 64x36 in "),
+        "{}",
+        run.out
+    );
+    assert!(
+        !run.err.contains('%'),
+        "a progress bar without a terminal: {}",
+        run.err
+    );
     let (width, height, bytes) = png(&dir.join("a.png"));
     assert_eq!((width, height, bytes.len()), (64, 36, 64 * 36 * 3));
     let (width, height, radiance) = exr(&dir.join("a.exr"));
@@ -54,7 +62,10 @@ fn every_result_of_one_frame() {
         } else {
             1.055 * linear.powf(1.0 / 2.4) - 0.055
         };
-        assert!((f64::from(*byte) - 255.0 * encoded).abs() <= 1.1, "{byte} {radiance}");
+        assert!(
+            (f64::from(*byte) - 255.0 * encoded).abs() <= 1.1,
+            "{byte} {radiance}"
+        );
     }
     let stats = json(&dir.join("s.json"));
     for (field, wanted) in [
@@ -67,7 +78,10 @@ fn every_result_of_one_frame() {
         assert_eq!(stats[field], wanted, "{stats}");
     }
     assert_eq!(stats["size"], serde_json::json!([64, 36]));
-    assert_eq!(stats["features"], serde_json::json!(["ATMOSPHERE", "CLOUDS", "TERRAIN"]));
+    assert_eq!(
+        stats["features"],
+        serde_json::json!(["ATMOSPHERE", "CLOUDS", "TERRAIN"])
+    );
     for field in ["adapter", "backend", "device_type", "driver", "driver_info"] {
         assert!(stats[field].is_string(), "{field}");
     }
@@ -105,8 +119,24 @@ fn frames_are_numbered_and_fly() {
     veduta(
         &dir,
         &[
-            "render", "clear", "--preset", "low", "--size", "32x18", "--frames", "3", "--fps", "2", "--time", "10", "--set",
-            "CAM_SPEED=900", "--out", "f.png", "--stats", "s.json",
+            "render",
+            "clear",
+            "--preset",
+            "low",
+            "--size",
+            "32x18",
+            "--frames",
+            "3",
+            "--fps",
+            "2",
+            "--time",
+            "10",
+            "--set",
+            "CAM_SPEED=900",
+            "--out",
+            "f.png",
+            "--stats",
+            "s.json",
         ],
     )
     .good();
@@ -125,7 +155,20 @@ fn frames_are_numbered_and_fly() {
     // The same moment by itself is the same picture but for the number that seeds the dither and jitter.
     veduta(
         &dir,
-        &["render", "clear", "--preset", "low", "--size", "32x18", "--time", "11", "--set", "CAM_SPEED=900", "--out", "one.png"],
+        &[
+            "render",
+            "clear",
+            "--preset",
+            "low",
+            "--size",
+            "32x18",
+            "--time",
+            "11",
+            "--set",
+            "CAM_SPEED=900",
+            "--out",
+            "one.png",
+        ],
     )
     .good();
     assert_eq!(png(&dir.join("one.png")).2, frames[2]);
@@ -135,7 +178,11 @@ fn frames_are_numbered_and_fly() {
 fn the_default_preset_follows_the_cargo_feature() {
     let dir = folder("render_default");
     veduta(&dir, &["render", "--size", "16x9", "--stats", "s.json"]).good();
-    let wanted = if cfg!(feature = "low_quality") { "thesis_low" } else { "thesis" };
+    let wanted = if cfg!(feature = "low_quality") {
+        "thesis_low"
+    } else {
+        "thesis"
+    };
     assert_eq!(json(&dir.join("s.json"))["preset"], wanted);
     assert!(!dir.join("s.png").exists());
 }
@@ -146,14 +193,33 @@ fn own_files_are_drawn_and_composed_on_the_spot() {
     copy_fixture("user_project/good", &dir);
     let own = |extra: &[&str], stats: &str| {
         let all = [
-            "render", "presets/scenes/dusk.ron", "--preset", "presets/coarse.ron", "--presets", "presets", "--size", "32x18", "--stats",
+            "render",
+            "presets/scenes/dusk.ron",
+            "--preset",
+            "presets/coarse.ron",
+            "--presets",
+            "presets",
+            "--size",
+            "32x18",
+            "--stats",
             stats,
         ];
         veduta(&dir, &[&all[..], extra].concat()).good();
         json(&dir.join(stats))
     };
-    let stats = own(&["--view", "presets/views/hut.ron", "--set", "SMOOTH_RIDGES=true"], "a.json");
-    assert_eq!((&stats["preset"], &stats["scene"]), (&"coarse".into(), &"dusk".into()));
+    let stats = own(
+        &[
+            "--view",
+            "presets/views/hut.ron",
+            "--set",
+            "SMOOTH_RIDGES=true",
+        ],
+        "a.json",
+    );
+    assert_eq!(
+        (&stats["preset"], &stats["scene"]),
+        (&"coarse".into(), &"dusk".into())
+    );
     let features: Vec<&str> = stats["features"]
         .as_array()
         .unwrap()
@@ -161,7 +227,16 @@ fn own_files_are_drawn_and_composed_on_the_spot() {
         .map(|f| f.as_str().unwrap())
         .collect();
     // No shipped preset smooths ridges: this variant was composed at run time.
-    assert_eq!(features, ["ATMOSPHERE", "CLOUD_SKIP", "SMOOTH_RIDGES", "TERRAIN", "TEXTURE_LOW_QUALITY"]);
+    assert_eq!(
+        features,
+        [
+            "ATMOSPHERE",
+            "CLOUD_SKIP",
+            "SMOOTH_RIDGES",
+            "TERRAIN",
+            "TEXTURE_LOW_QUALITY"
+        ]
+    );
     let built = veduta::programs().get("landscape", &features);
     assert!(built.is_err());
     own(&["--view", "hut"], "b.json");
@@ -223,7 +298,10 @@ fn the_flight_goes_on_for_ever() {
         let green: Vec<f32> = pixels.iter().skip(1).step_by(4).copied().collect();
         let mean = green.iter().sum::<f32>() / green.len() as f32;
         let spread = green.iter().map(|g| (g - mean).abs()).sum::<f32>() / green.len() as f32;
-        assert!(mean > 0.01 && spread > 0.05 * mean, "{time}: {mean} {spread}");
+        assert!(
+            mean > 0.01 && spread > 0.05 * mean,
+            "{time}: {mean} {spread}"
+        );
         pictures.push(pixels);
     }
     assert!(pictures[0] != pictures[1] && pictures[1] != pictures[2]);
@@ -266,7 +344,11 @@ fn the_ground_is_where_the_device_draws_it() {
 #[test]
 fn cameras_look_where_they_should() {
     let mut wanted = args("clear", "thesis", None);
-    wanted.sets = vec!["SUN_INTENSITY=7".to_owned(), "EXPOSURE=0.5".to_owned(), "SUN_HEIGHT=10".to_owned()];
+    wanted.sets = vec![
+        "SUN_INTENSITY=7".to_owned(),
+        "EXPOSURE=0.5".to_owned(),
+        "SUN_HEIGHT=10".to_owned(),
+    ];
     wanted.camera = Some([1e3, 2.5e3, -2e3]);
     wanted.look = Some([90.0, 20.0]);
     wanted.fov = Some(40.0);
@@ -282,10 +364,21 @@ fn cameras_look_where_they_should() {
         sun_azimuth: 120.0,
     };
     assert_eq!(job.camera, camera);
-    let view = job.view(2.0, Size { width: 200, height: 100 }).unwrap();
+    let view = job
+        .view(
+            2.0,
+            Size {
+                width: 200,
+                height: 100,
+            },
+        )
+        .unwrap();
     let eye = view.eye.to_metres();
     // East, 50 m/s.
-    assert!((eye - veduta::glam::DVec3::new(1100.0, 2500.0, -2000.0)).length() < 1e-3, "{eye}");
+    assert!(
+        (eye - veduta::glam::DVec3::new(1100.0, 2500.0, -2000.0)).length() < 1e-3,
+        "{eye}"
+    );
     assert_eq!((view.exposure, view.time), (0.5, 2.0));
     assert_eq!(view.sun.irradiance, veduta::glam::Vec3::splat(7.0));
     let sun = veduta::view::direction(10_f64.to_radians(), 210_f64.to_radians()).as_vec3();
@@ -299,7 +392,10 @@ fn cameras_look_where_they_should() {
     // A view gives place, height, direction and sun.
     let job = Job::new(&args("clear", "thesis", Some("V12"))).unwrap();
     assert_eq!(job.camera.height, EyeHeight::AboveGround(1500.0));
-    assert_eq!((job.camera.field_of_view, job.camera.sun_azimuth), (10.0, 100.0));
+    assert_eq!(
+        (job.camera.field_of_view, job.camera.sun_azimuth),
+        (10.0, 100.0)
+    );
 }
 
 #[test]
@@ -319,8 +415,13 @@ fn precedence_is_set_scene_preset_declaration() {
     let mut wanted = args(&file("s.ron"), &file("p.ron"), None);
     wanted.sets = vec!["CLOUD_COVERAGE=0.3".to_owned()];
     let job = Job::new(&wanted).unwrap();
-    let values = ["CLOUD_COVERAGE", "TERRAIN_HEIGHT", "CAM_SPEED", "TERRAIN_SCALE"]
-        .map(|key| job.settings.number(key).unwrap());
+    let values = [
+        "CLOUD_COVERAGE",
+        "TERRAIN_HEIGHT",
+        "CAM_SPEED",
+        "TERRAIN_SCALE",
+    ]
+    .map(|key| job.settings.number(key).unwrap());
     assert_eq!(values, [0.3, 200.0, 5.0, 8192.0]);
 }
 
@@ -337,7 +438,9 @@ fn frames_are_measured() {
         assert!(measured.median_cpu_ms().unwrap() > 0.0);
     }
     assert!(measure(&mut renderer, &view, 0).is_err());
-    renderer.set_content("CLOUD_COVERAGE", Value::Float(0.7)).unwrap();
+    renderer
+        .set_content("CLOUD_COVERAGE", Value::Float(0.7))
+        .unwrap();
     assert!(renderer.set_content("OCTAVES", Value::Int(3)).is_err());
 }
 
@@ -350,7 +453,10 @@ fn operation_counts_do_not_depend_on_tiles_or_time() {
     let skip = Job::new(&args("thesis", "thesis_skip", Some("V01"))).unwrap();
     let skip = skip.operation_counts(gpu, SMALL, 0.0).unwrap();
     // Skipping spares light samples and leaves the terrain alone.
-    assert!(skip[2].0 < first[2].0 && skip[3] == first[3], "{skip:?} {first:?}");
+    assert!(
+        skip[2].0 < first[2].0 && skip[3] == first[3],
+        "{skip:?} {first:?}"
+    );
 }
 
 #[test]
@@ -373,7 +479,8 @@ fn bad_options_are_told() {
     run(&["--set", "OCTAVES=99", "--out", "a.png"]).bad(1, &["OCTAVES", "99", "[1, 24]"]);
     run(&["--set", "OCTAVES=many", "--out", "a.png"]).bad(1, &["OCTAVES", "many", "i32"]);
     run(&["--set", "EXPOSURE=NaN", "--out", "a.png"]).bad(1, &["EXPOSURE", "NaN"]);
-    run(&["--set", "OCTAVES=3", "--set", "OCTAVES=4", "--out", "a.png"]).bad(1, &["OCTAVES=4", "once"]);
+    run(&["--set", "OCTAVES=3", "--set", "OCTAVES=4", "--out", "a.png"])
+        .bad(1, &["OCTAVES=4", "once"]);
     run(&["--time", "inf", "--out", "a.png"]).bad(1, &["--time", "inf"]);
     run(&["--time", "NaN", "--out", "a.png"]).bad(1, &["--time", "NaN"]);
     run(&["--time", "1e300", "--out", "a.png"]).bad(1, &["of the eye", "1000000000000000"]);
@@ -384,7 +491,11 @@ fn bad_options_are_told() {
     run(&["--camera", "NaN,0,0", "--out", "a.png"]).bad(1, &["x of the eye", "NaN"]);
     run(&["--frames", "0", "--out", "a.png"]).bad(1, &["--frames", "at least 1"]);
     run(&["--frames", "2", "--fps", "0", "--out", "a.png"]).bad(1, &["--fps", "more than 0"]);
-    std::fs::write(dir.join("bad.ron"), "(reason: \"x\", values: {\"OCTAVES\": 0.5})").unwrap();
+    std::fs::write(
+        dir.join("bad.ron"),
+        "(reason: \"x\", values: {\"OCTAVES\": 0.5})",
+    )
+    .unwrap();
     run(&["--preset", "bad.ron", "--out", "a.png"]).bad(1, &["bad.ron:1:", "OCTAVES"]);
     std::fs::write(
         dir.join("odd.ron"),

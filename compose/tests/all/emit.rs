@@ -52,6 +52,12 @@ fn variants_are_the_closure_of_scenes_and_presets() {
             .starts_with("diagnostic(off, derivative_uniformity);\n\n")
     );
     assert!(!output.rust.contains("fn still"));
+    // Units in brackets are no links for rustdoc.
+    assert!(
+        output
+            .rust
+            .contains("/// Where the eye is \\[m\\]. (`vec3<f32>`)")
+    );
 }
 
 #[test]
@@ -71,7 +77,13 @@ fn reflection_is_complete() {
         bindings,
         [
             (0, 0, "view", BindingType::Uniform { min_size: 192 }, both),
-            (1, 0, "content", BindingType::Uniform { min_size: 32 }, fragment),
+            (
+                1,
+                0,
+                "content",
+                BindingType::Uniform { min_size: 32 },
+                fragment
+            ),
             (
                 1,
                 1,
@@ -184,7 +196,12 @@ fn a_users_build_chooses_presets_and_programs() {
     // What Cargo tells the build script of a dependent; no other test reads these variables.
     // (Set by the child process, as tests run in threads.)
     let child = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "emit::child_of_a_users_build", "--ignored", "--nocapture"])
+        .args([
+            "--exact",
+            "emit::child_of_a_users_build",
+            "--ignored",
+            "--nocapture",
+        ])
         .env("DEP_VEDUTA_WGSL", fixture("project/shaders"))
         .env("DEP_VEDUTA_PRESETS", fixture("project/presets"))
         .env("OWN_PRESET", &out)
@@ -219,15 +236,50 @@ fn child_of_a_users_build() {
     };
     let output = Build::new().preset(preset).try_write().unwrap();
     assert_eq!(output.presets, ["own_preset"]);
-    let features: Vec<_> = output.programs.iter().map(|p| p.features.join(" ")).collect();
+    let features: Vec<_> = output
+        .programs
+        .iter()
+        .map(|p| p.features.join(" "))
+        .collect();
     assert_eq!(features, ["", "LOW_QUALITY", "LOW_QUALITY WATER"]);
-    let error = Build::new().preset("thesis_lo").run().unwrap_err().to_string();
+    let error = Build::new()
+        .preset("thesis_lo")
+        .run()
+        .unwrap_err()
+        .to_string();
     assert_eq!(
         error,
         "build.rs: there is no preset `thesis_lo`\nnote: did you mean `thesis_low`?"
     );
-    let output = Build::new().programs(fixture("project/shaders")).run().unwrap();
-    // Without a scene a program is composed with the preset's own flags.
+    // Keys beside the shaders count, and a user's override need not be a key.
+    let own = Path::new(env!("CARGO_TARGET_TMPDIR")).join("own_shaders");
+    std::fs::create_dir_all(&own).unwrap();
+    std::fs::copy(fixture("project/own_keys.ron"), own.join("keys.ron")).unwrap();
+    std::fs::copy(fixture("project/own.sp"), own.join("own.sp")).unwrap();
+    let build = Build::new().programs(&own).variant("own", ["RIPPLES"]);
+    let output = build.run().unwrap_or_else(|diags| panic!("{diags}"));
+    assert!(output.rust.contains("\"RIPPLES\""));
     assert_eq!(output.default_preset, "thesis");
-    assert_eq!(output.programs.len(), 2);
+    let features: Vec<_> = output
+        .programs
+        .iter()
+        .map(|p| (p.program.as_str(), p.features.join(" ")))
+        .collect();
+    assert_eq!(features, [("own", "".into()), ("own", "RIPPLES".into())]);
+    assert_eq!(output.programs[1].overrides[0].name, "FREQUENCY");
+    let error = build
+        .clone()
+        .variant("owm", [])
+        .run()
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        error,
+        "build.rs: there is no program `owm`\nnote: did you mean `own`?"
+    );
+    let error = build.claim("f61").run().unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "build.rs: there is no capability `f61` to claim\nnote: known are `f16` and `subgroups`"
+    );
 }

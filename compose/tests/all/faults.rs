@@ -66,7 +66,7 @@ impl Project {
 
 /// A module at `m.wgsl` with path `t::m` whose fourth line is the given text.
 fn module(body: &str) -> String {
-    format!("//! A module.\n#define_import_path t::m\n\n{body}\n")
+    format!("// A module.\n#define_import_path t::m\n\n{body}\n")
 }
 
 const HEIGHT: &str = "#define_import_path veduta::terrain::height\n\nvirtual fn height(x: f32) -> f32 { return x; }\nfn slope(x: f32) -> f32 { return height(x + 1.0) - height(x); }\n";
@@ -150,4 +150,25 @@ fn faults_of_stages() {
             &[],
         )
     });
+}
+
+#[test]
+fn headers_are_linted() {
+    let run = |text: &str, required: bool| {
+        let library = Library::from_sources(vec![("m.wgsl".to_owned(), text.to_owned())]).unwrap();
+        Composer::new(&library, Keys::default())
+            .require_headers(required)
+            .check_modules()
+            .to_string()
+    };
+    let bare = "#define_import_path t::m\nfn f() -> f32 { return 1.0; }\n";
+    assert_eq!(run(bare, false), "");
+    let error = run(bare, true);
+    assert!(
+        error.contains("m.wgsl:2:4: function `f` has no header"),
+        "{error}"
+    );
+    // Who starts with a header must do it well.
+    let titled = format!("//! A module.\n//! source  ours\n{bare}");
+    assert!(run(&titled, false).contains("m.wgsl:4:4: function `f` has no header"));
 }

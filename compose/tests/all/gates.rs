@@ -138,10 +138,7 @@ fn panics_of_writers_are_faults() {
     // naga validates this, and then its SPIR-V writer panics.
     let text = "fn assign(p: ptr<function, f32>) { *p = 1.0; }\n@compute @workgroup_size(1) fn main() { var a: array<f32, 4>; assign(&a[1]); }";
     let error = write_target(text, Target::Spirv, Capabilities::empty()).unwrap_err();
-    assert!(
-        error.starts_with("the SPIR-V writer panicked: "),
-        "{error}"
-    );
+    assert!(error.starts_with("the SPIR-V writer panicked: "), "{error}");
 }
 
 #[test]
@@ -207,7 +204,8 @@ const STEEP: (&str, &str) = (
 
 #[test]
 fn a_height_function_is_plugged_in() {
-    let plain = "#import veduta::terrain::height::{slope}\nfn value(i: u32) -> f32 { return slope(1.0); }";
+    let plain =
+        "#import veduta::terrain::height::{slope}\nfn value(i: u32) -> f32 { return slope(1.0); }";
     let of = |body: &str, plug_ins: &[&str]| {
         wgsl(compose(
             &[HEIGHT, STEEP],
@@ -228,10 +226,7 @@ fn a_height_function_is_plugged_in() {
     );
     assert!(by_program.contains("3.5f"), "{by_program}");
     // A program that does not reach the height function is left alone.
-    let other = of(
-        "fn value(i: u32) -> f32 { return 1.0; }",
-        &["mine::steep"],
-    );
+    let other = of("fn value(i: u32) -> f32 { return 1.0; }", &["mine::steep"]);
     assert!(!other.contains("FACTOR"), "{other}");
 }
 
@@ -257,7 +252,10 @@ fn names_that_clash_stay_readable() {
     for name in ["struct Hit {", "fn march(", "const LIMIT:", "fn limit("] {
         assert_eq!(text.matches(name).count(), 1, "{name} in\n{text}");
     }
-    assert!(!text.contains("naga_oil") && !text.contains("_1("), "{text}");
+    assert!(
+        !text.contains("naga_oil") && !text.contains("_1("),
+        "{text}"
+    );
 }
 
 #[test]
@@ -265,8 +263,14 @@ fn many_ways_through_the_imports() {
     // Each module imports both of the level before: the number of ways doubles with each level.
     let levels = 14;
     let mut modules = vec![
-        ("a0.wgsl".to_owned(), "#define_import_path t::a0\nfn fa(x: f32) -> f32 { return x; }\n".to_owned()),
-        ("b0.wgsl".to_owned(), "#define_import_path t::b0\nfn fb(x: f32) -> f32 { return x + 1.0; }\n".to_owned()),
+        (
+            "a0.wgsl".to_owned(),
+            "#define_import_path t::a0\nfn fa(x: f32) -> f32 { return x; }\n".to_owned(),
+        ),
+        (
+            "b0.wgsl".to_owned(),
+            "#define_import_path t::b0\nfn fb(x: f32) -> f32 { return x + 1.0; }\n".to_owned(),
+        ),
     ];
     for level in 1..levels {
         for side in ["a", "b"] {
@@ -279,7 +283,10 @@ fn many_ways_through_the_imports() {
             ));
         }
     }
-    let modules: Vec<(&str, &str)> = modules.iter().map(|(f, t)| (f.as_str(), t.as_str())).collect();
+    let modules: Vec<(&str, &str)> = modules
+        .iter()
+        .map(|(f, t)| (f.as_str(), t.as_str()))
+        .collect();
     let start = std::time::Instant::now();
     let text = wgsl(compose(
         &modules,
@@ -291,5 +298,8 @@ fn many_ways_through_the_imports() {
         &[],
     ));
     eprintln!("{:?}", start.elapsed());
-    assert_eq!(text.matches("\nfn ").count(), 2 * (levels - 1) + 1 + 2 - 1 + 1);
+    assert_eq!(
+        text.matches("\nfn ").count(),
+        2 * (levels - 1) + 1 + 2 - 1 + 1
+    );
 }

@@ -4,5 +4,6 @@ mod emit;
 mod faults;
 mod fuzz;
 mod gates;
+mod library;
 mod link;
 mod readers;
