@@ -20,7 +20,7 @@
 /// domain  hurst in [0, 2] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-16, 16] 1
-/// error   5e-6 abs of reference::fractal::fbm_2d
+/// error   8e-6 abs of reference::fractal::fbm_2d
 /// source  Leitner2022 alg. 1
 fn fbm_2d(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed: u32) -> f32 {
     let fall = octave_fall(hurst);
@@ -44,7 +44,7 @@ fn fbm_2d(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed: u32)
 /// domain  hurst in [0, 2] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-16, 16] 1
-/// error   5e-6 abs of reference::fractal::fbm_3d
+/// error   8e-6 abs of reference::fractal::fbm_3d
 /// source  Leitner2022 alg. 1
 fn fbm_3d(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed: u32) -> f32 {
     let fall = octave_fall(hurst);
@@ -70,7 +70,7 @@ fn fbm_3d(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed: u32)
 /// domain  hurst in [0, 2] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-400000, 400000] 1
-/// error   0.07 abs of reference::fractal::fbm_2d_slope
+/// error   0.2 abs of reference::fractal::fbm_2d_slope
 /// source  Leitner2022 alg. 1
 fn fbm_2d_slope(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed: u32) -> vec3<f32> {
     let fall = octave_fall(hurst);
@@ -97,7 +97,7 @@ fn fbm_2d_slope(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed
 /// domain  hurst in [0, 2] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-400000, 400000] 1
-/// error   0.07 abs of reference::fractal::fbm_3d_slope
+/// error   0.2 abs of reference::fractal::fbm_3d_slope
 /// source  Leitner2022 alg. 1
 fn fbm_3d_slope(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed: u32) -> vec4<f32> {
     let fall = octave_fall(hurst);

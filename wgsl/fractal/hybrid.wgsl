@@ -16,7 +16,7 @@
 /// domain  offset in [0, 1] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-16, 32] 1
-/// error   1e-5 abs of reference::fractal::hybrid_multifractal_2d
+/// error   5e-5 abs of reference::fractal::hybrid_multifractal_2d
 /// source  Leitner2022 alg. 2
 fn hybrid_multifractal_2d(
     cell: vec2<i32>,
@@ -54,7 +54,7 @@ fn hybrid_multifractal_2d(
 /// domain  offset in [0, 1] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-1e6, 1e6] 1
-/// error   0.2 abs of reference::fractal::hybrid_multifractal_2d_slope
+/// error   0.4 abs of reference::fractal::hybrid_multifractal_2d_slope
 /// source  Leitner2022 alg. 2
 fn hybrid_multifractal_2d_slope(
     cell: vec2<i32>,

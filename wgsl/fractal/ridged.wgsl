@@ -35,7 +35,7 @@ fn smooth_abs(n: f32, smoothness: f32) -> f32 {
 /// domain  smoothness in [0, 1] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [0, 16] 1
-/// error   1e-5 abs of reference::fractal::ridged_multifractal_2d
+/// error   2e-5 abs of reference::fractal::ridged_multifractal_2d
 /// source  Leitner2022 alg. 3; departs: squared in every octave
 fn ridged_multifractal_2d(
     cell: vec2<i32>,
@@ -76,7 +76,7 @@ fn ridged_multifractal_2d(
 /// domain  smoothness in [0, 1] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-1e6, 1e6] 1
-/// error   0.2 abs of reference::fractal::ridged_multifractal_2d_slope
+/// error   0.4 abs of reference::fractal::ridged_multifractal_2d_slope
 /// source  Leitner2022 alg. 3; departs: squared in every octave
 fn ridged_multifractal_2d_slope(
     cell: vec2<i32>,
@@ -120,7 +120,7 @@ fn ridged_multifractal_2d_slope(
 /// domain  smoothness in [0, 1] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-7, 16] 1
-/// error   1e-5 abs of reference::fractal::ridged_multifractal_printed_2d
+/// error   2e-5 abs of reference::fractal::ridged_multifractal_printed_2d
 /// source  Leitner2022 alg. 3
 fn ridged_multifractal_printed_2d(
     cell: vec2<i32>,
