@@ -94,7 +94,7 @@ fn octave_frequency(i: i32) -> f32 {
 ///
 /// domain  hurst in [0, 4] 1 lin
 /// range   [0.0625, 1] 1
-/// error   8e-8 rel of reference::noise::octave_fall
+/// error   1e-6 rel of reference::noise::octave_fall
 /// monotone hurst
 /// source  Leitner2022 alg. 1 (amplitude f^-H)
 fn octave_fall(hurst: f32) -> f32 {
