@@ -62,7 +62,7 @@ pub fn air_density(atmosphere: &Atmosphere, h: f64) -> [f64; 2] {
     ]
 }
 
-/// Density integrals to the top of the shell [m] by the midpoint rule with `steps` points.
+/// Density integrals to the top of the shell (m) by the midpoint rule with `steps` points.
 pub fn air_column(atmosphere: &Atmosphere, h: f64, mu: f64, steps: i32) -> [f64; 2] {
     let count = steps.max(1);
     let dt = top_distance(atmosphere.ground_radius, atmosphere.top, h, mu) / f64::from(count);
@@ -155,7 +155,7 @@ fn radiance(atmosphere: &Atmosphere, nu: f64, rayleigh: [f64; 3], mie: [f64; 3])
     })
 }
 
-/// Density integrals over [0, distance] of a ray [m] by a composite Gauss-Legendre rule, split where the ray is lowest.
+/// Density integrals over 0 to `distance` of a ray (m) by a composite Gauss-Legendre rule, split where the ray is lowest.
 pub fn air_column_exact(atmosphere: &Atmosphere, h: f64, mu: f64, distance: f64) -> [f64; 2] {
     let rule = gauss_legendre(16);
     let lowest = (-(atmosphere.ground_radius + h) * mu).clamp(0.0, distance);
@@ -180,8 +180,8 @@ pub fn air_column_exact(atmosphere: &Atmosphere, h: f64, mu: f64, distance: f64)
     sum
 }
 
-/// Sky light by adaptive quadrature to the absolute `tolerance` of the two integrals [m], split at the planet's shadow;
-/// the error estimate is that of the larger integral [m].
+/// Sky light by adaptive quadrature to the absolute `tolerance` of the two integrals (m), split at the planet's shadow;
+/// the error estimate is that of the larger integral (m).
 pub fn sky_adaptive(
     atmosphere: &Atmosphere,
     eye_altitude: f64,

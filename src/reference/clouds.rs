@@ -17,7 +17,7 @@ pub struct CloudLayer {
     pub frac: [f64; 3],
     /// Wavelength of the first octave.
     pub wavelength: f64,
-    /// Period of the lattice [cells].
+    /// Period of the lattice (cells).
     pub period: i32,
     /// Octaves of the noise.
     pub octaves: i32,
@@ -52,7 +52,7 @@ pub struct CloudLight {
     pub scatter: f64,
     /// Transmittance of the ray.
     pub transmittance: f64,
-    /// Mean distance of what is seen [m].
+    /// Mean distance of what is seen (m).
     pub mean_distance: f64,
 }
 

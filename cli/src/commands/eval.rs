@@ -15,7 +15,7 @@ pub struct EvalArgs {
     /// An item to import, for instance veduta::noise::value::value_noise_2d; may be repeated
     #[arg(long = "import", value_name = "MODULE::ITEM")]
     pub imports: Vec<String>,
-    /// The WGSL expression; column k of a row is in.f[k], in.i[k] or in.u[k]
+    /// The WGSL expression; column k of a row is `in.f[k]`, `in.i[k]` or `in.u[k]`
     #[arg(long = "expr", value_name = "WGSL", allow_hyphen_values = true)]
     pub expression: String,
     /// The type of each column, up to 16: i (i32), u (u32) or f (f32)
