@@ -349,14 +349,23 @@ impl Landscape {
         };
         let (terrain_cell, terrain_frac) = place("TERRAIN_SCALE")?;
         let (rock_cell, rock_frac) = place("ROCK_SCALE")?;
+        // Period and wavelength differ by a power of two, so that the cell and the fraction give the turn exactly.
+        let doublings = number("CLOUD_PERIOD_DOUBLINGS") as u32;
         let (cloud_cell, cloud_frac) = place("CLOUD_SCALE")?;
+        let cloud_turn = [0, 1, 2].map(|axis| {
+            let cells = 2_f64.powi(32 - doublings.min(32).cast_signed());
+            let within = (f64::from(cloud_frac[axis]) * cells) as u32;
+            (cloud_cell[axis].cast_unsigned())
+                .checked_shl(32 - doublings)
+                .unwrap_or(0)
+                .wrapping_add(within)
+        });
         Ok(Anchors {
             terrain_cell: [terrain_cell[0], terrain_cell[2]],
             terrain_frac: [terrain_frac[0], terrain_frac[2]],
             rock_cell,
             rock_frac,
-            cloud_cell,
-            cloud_frac,
+            cloud_turn,
             ..Default::default()
         })
     }

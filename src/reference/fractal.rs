@@ -120,6 +120,16 @@ pub fn fbm_value_3d_periodic(
     sum / amplitude_sum(octaves, hurst)
 }
 
+/// Six octaves of value noise in 3D on a torus of 2^doublings cells of octave 0 on each axis, at a position in turns of
+/// 2^32, divided by the sum of the amplitudes; `fall` is what the amplitude falls by from octave to octave.
+pub fn fbm_value_3d_torus_six(turn: [u32; 3], doublings: u32, fall: f64, seed: u32) -> f64 {
+    let below = 32 - doublings;
+    let cell = turn.map(|t| (t >> below).cast_signed());
+    let frac = turn.map(|t| f64::from(t << doublings) / 2_f64.powi(32));
+    let period = [1 << doublings; 3];
+    fbm_value_3d_periodic(cell, frac, period, 6, -fall.log2(), seed)
+}
+
 /// The product rule for (value, d/dx, d/dy).
 fn times(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [

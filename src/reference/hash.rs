@@ -97,6 +97,17 @@ pub fn lattice_hash_3d(cell: [i32; 3], seed: u32) -> [u32; 3] {
     pcg_3d_keyed(words(cell), seed)
 }
 
+/// One random word of a lattice point, of which the 23 lowest bits count.
+pub fn lattice_word_3d(cell: [i32; 3], seed: u32) -> u32 {
+    let multipliers = [747_796_405, 2_654_435_769, 2_246_822_519];
+    let [x, y, z] = std::array::from_fn(|axis| {
+        let word = cell[axis].cast_unsigned().wrapping_mul(multipliers[axis]);
+        word ^ (word >> 16)
+    });
+    let row = y.wrapping_add(z ^ spread(seed));
+    (x ^ row).wrapping_mul(row | 1)
+}
+
 const PRIMES: [u32; 3] = [149, 233, 367];
 
 /// The source's XOR scheme in 2D, eq. 5.3, on integers.

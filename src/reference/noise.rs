@@ -2,7 +2,7 @@
 //!
 //! Written as the definition says: a sum over the 2^n corners of a cell, each weighted by a product of fades.
 
-use super::hash::{lattice_hash_2d, lattice_hash_3d, unit_float};
+use super::hash::{lattice_hash_2d, lattice_word_3d, unit_float};
 
 /// A position on a 2D lattice, `cell + frac`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,7 +98,17 @@ pub fn fade(t: f64) -> f64 {
     t * t * t * (t * (6.0 * t - 15.0) + 10.0)
 }
 
-/// Its derivative, 30 t^2 (1 - t)^2.
+/// The quintic fade of t = s + 1/2.
+pub fn fade_centred(s: f64) -> f64 {
+    fade(s + 0.5)
+}
+
+/// The position within a torus in turns of 2^32, at `turns` turns from its start.
+pub fn turn_3d(turns: [f64; 3]) -> [u32; 3] {
+    turns.map(|t| ((t - t.floor()) * 2_f64.powi(32)) as u64 as u32)
+}
+
+/// The derivative of the quintic fade, 30 t^2 (1 - t)^2.
 pub fn fade_slope(t: f64) -> f64 {
     let q = t * (1.0 - t);
     30.0 * q * q
@@ -149,12 +159,17 @@ pub fn value_noise_2d_slope(cell: [i32; 2], frac: [f64; 2], seed: u32) -> [f64; 
     [value, dx, dy]
 }
 
+/// The 23 lowest bits of a word as a number in [0, 1).
+fn low_unit(word: u32) -> f64 {
+    f64::from(word & 0x7f_ffff) / f64::from(1_u32 << 23)
+}
+
 /// Value noise in 3D and its gradient: value, d/dx, d/dy, d/dz.
 pub fn value_noise_3d_slope(cell: [i32; 3], frac: [f64; 3], seed: u32) -> [f64; 4] {
     let p = split_3d(cell, frac);
     let (value, [dx, dy, dz]) = blend(p.frac, |offset| {
-        let word = lattice_hash_3d(neighbour(p.cell, offset), seed)[0];
-        (unit_float(word), [0.0; 3])
+        let word = lattice_word_3d(neighbour(p.cell, offset), seed);
+        (low_unit(word), [0.0; 3])
     });
     [value, dx, dy, dz]
 }
@@ -173,8 +188,8 @@ pub fn value_noise_3d(cell: [i32; 3], frac: [f64; 3], seed: u32) -> f64 {
 pub fn value_noise_3d_periodic(cell: [i32; 3], frac: [f64; 3], period: [i32; 3], seed: u32) -> f64 {
     let p = split_3d(cell, frac);
     let (value, _) = blend(p.frac, |offset| {
-        let word = lattice_hash_3d(wrap_3d(neighbour(p.cell, offset), period), seed)[0];
-        (unit_float(word), [0.0; 3])
+        let word = lattice_word_3d(wrap_3d(neighbour(p.cell, offset), period), seed);
+        (low_unit(word), [0.0; 3])
     });
     value
 }
@@ -198,21 +213,21 @@ pub fn lattice_gradient_2d(cell: [i32; 2], seed: u32) -> [f64; 2] {
 /// The gradient at a lattice point in 3D: length 1.3847, one of the 24 vectors (0, +-a, +-b) and permutations with
 /// a/b the golden ratio or its inverse.
 pub fn lattice_gradient_3d(cell: [i32; 3], seed: u32) -> [f64; 3] {
-    let word = lattice_hash_3d(cell, seed)[0];
+    let word = lattice_word_3d(cell, seed);
     let golden = (1.0 + 5_f64.sqrt()) / 2.0;
     let length = 1.3847;
     let long = length * golden / (1.0 + golden * golden).sqrt();
     let short = length / (1.0 + golden * golden).sqrt();
     let sign = |bit: u32| if word >> bit & 1 == 1 { -1.0 } else { 1.0 };
-    let sides = if word >> 2 & 1 == 1 {
+    let sides = if word >> 20 & 1 == 1 {
         [short, long]
     } else {
         [long, short]
     };
-    let p = sign(0) * sides[0];
-    let q = sign(1) * sides[1];
-    // The word as a signed number, in thirds of its range, says which component is 0; the others follow cyclically.
-    let third = ((i64::from(word.cast_signed()) + (1 << 31)) * 3) >> 32;
+    let p = sign(22) * sides[0];
+    let q = sign(21) * sides[1];
+    // The third of their range in which the 20 lowest bits lie says which component is 0; the others follow cyclically.
+    let third = (word & 0xf_ffff) * 3 >> 20;
     match third {
         0 => [0.0, p, q],
         1 => [q, 0.0, p],

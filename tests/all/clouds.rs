@@ -10,7 +10,8 @@ const RADIUS: f64 = 6.36e6;
 
 const LAYER: &str = "
 fn layer(coverage: f32, uniformity: f32, extinction: f32, backward_share: f32) -> CloudLayer {
-    return CloudLayer(vec3i(3, -1, 7), vec3f(0.25, 0.5, 0.75), 4000.0, 4, 1.0, 4000.0, 1500.0, coverage, uniformity,
+    // (3.25, 3.5, 3.75) of 4 cells.
+    return CloudLayer(vec3u(3489660928u, 3758096384u, 4026531840u), 0.0000625, 2u, 0.5, 4000.0, 1500.0, coverage, uniformity,
         extinction, 0.9, 0.7, -0.5, backward_share, 2u);
 }
 ";

@@ -191,12 +191,26 @@ fn row_l07_fbm() {
     });
     assert!(s.low >= 0.0 && s.high <= 1.0, "{s:?}");
 
-    let arguments = format!("{AT_3D}, vec3i(in.i[11], in.i[12], in.i[13]), in.f[8], in.u[6]");
-    let name = of("fbm_value_3d_periodic_six");
-    let s = check(&name, &arguments, 14, POINTS, periodic, |r| {
-        let h = hurst::<3>(r);
-        let v = fbm_value_3d_periodic(cell(r), floats(&r[3..]), cell(&r[11..]), 6, h, r[6]);
-        normalised(&[&r[..7], &[6], &r[8..]].concat(), v)
+    // Columns: turns, doublings, fall, seed.
+    let torus = |random: &mut Random, row: &mut [u32]| {
+        for word in &mut row[..3] {
+            *word = random.bits() as u32;
+        }
+        row[3] = 1 + random.bits() as u32 % 16;
+        row[4] = random.between(0.0625, 1.0).to_bits();
+        row[5] = random.bits() as u32;
+    };
+    let name = of("fbm_value_3d_torus_six");
+    let arguments = "vec3u(in.u[0], in.u[1], in.u[2]), in.u[3], in.f[4], in.u[5]";
+    let s = check(&name, arguments, 6, POINTS, torus, |r| Truth {
+        value: [
+            fbm_value_3d_torus_six([r[0], r[1], r[2]], r[3], float(r[4]), r[5]),
+            0.0,
+            0.0,
+            0.0,
+        ],
+        bar: [bar(6); 4],
+        kink: false,
     });
     assert!(s.low >= 0.0 && s.high <= 1.0, "{s:?}");
 

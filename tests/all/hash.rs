@@ -131,7 +131,7 @@ fn hashes_on_the_device_equal_their_twins() {
     const C2: &str = "vec2i(in.i[0], in.i[1])";
     const C3: &str = "vec3i(in.i[0], in.i[1], in.i[2])";
     let float = |v: f64| (v as f32).to_bits();
-    let cases: [(&str, String, Twin); 17] = [
+    let cases: [(&str, String, Twin); 18] = [
         ("pcg::pcg", "in.u[0]".into(), |r| vec![pcg(r[0])]),
         ("pcg::pcg_2d", V2.into(), |r| pcg_2d(two(r)).to_vec()),
         ("pcg::pcg_3d", V3.into(), |r| pcg_3d(three(r)).to_vec()),
@@ -145,6 +145,9 @@ fn hashes_on_the_device_equal_their_twins() {
         }),
         ("pcg::pcg_3d_keyed", format!("{V3}, in.u[4]"), |r| {
             pcg_3d_keyed(three(r), r[4]).to_vec()
+        }),
+        ("lattice::lattice_word_3d", format!("{C3}, in.u[4]"), |r| {
+            vec![lattice_word_3d(cell3(r), r[4])]
         }),
         ("pcg::unit_float", "in.u[0]".into(), |r| {
             vec![(unit_float(r[0]) as f32).to_bits()]
@@ -350,6 +353,38 @@ fn words_of_the_default_hashes_repeat_as_rarely_as_random_ones() {
     }
 }
 
+/// The cheap word on planes through its lattice, as its users take it: its 23 lowest bits as a number, or the 20 lowest,
+/// and those above as signs.
+fn planes_of_words() -> Vec<Plane> {
+    let mut planes = Vec::new();
+    for seed in [0, 5, 0x9e37_79b9] {
+        for (fixed, value) in [(0, 7), (1, 0), (1, 1000), (2, 0), (2, 100_000_000)] {
+            for bits in [23, 20] {
+                for corner in [0, 0_u32.wrapping_sub(512), 100_000_000] {
+                    planes.push(Plane {
+                        name: format!("lattice_word_3d {bits} bits, axis {fixed} at {value}, from {corner}, seed {seed}"),
+                        word: Box::new(move |[a, b]| {
+                            let [a, b] = [a, b].map(|c| c.wrapping_add(corner));
+                            let v = match fixed {
+                                0 => [value, a, b],
+                                1 => [a, value, b],
+                                _ => [a, b, value],
+                            };
+                            let word = lattice_word_3d(v.map(u32::cast_signed), seed);
+                            if bits == 23 {
+                                word << 9 | word >> 21 & 3
+                            } else {
+                                word << 12 | word >> 20 & 3
+                            }
+                        }),
+                    });
+                }
+            }
+        }
+    }
+    planes
+}
+
 #[test]
 fn neighbours_are_not_correlated() {
     const N: usize = 1024;
@@ -365,7 +400,7 @@ fn neighbours_are_not_correlated() {
         (0, 16),
         (64, 64),
     ];
-    let planes = planes();
+    let planes: Vec<Plane> = planes().into_iter().chain(planes_of_words()).collect();
     let worst = parallel(&planes, |plane| {
         // The number itself, then its ends: signs are made of the lowest bits.
         let words: Vec<u32> = block(N as u32).map(&plane.word).collect();

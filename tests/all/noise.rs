@@ -240,6 +240,53 @@ fn cells_wrap_exactly() {
 }
 
 #[test]
+fn turns_wrap_and_keep_their_promised_error() {
+    let mut random = Random(14);
+    let mut rows: Vec<u32> = (0..1_000_000)
+        .map(|k| match k % 4 {
+            0 => random.between(-1.0, 1.0),
+            1 => random.between(-64.0, 64.0),
+            2 => random.between(-4_194_304.0, 4_194_304.0),
+            _ => (random.between(-100.0, 100.0) * 2.0).round() / 2.0,
+        })
+        .map(f32::to_bits)
+        .collect();
+    rows.extend(
+        [
+            0.0_f32,
+            -0.0,
+            0.5,
+            -0.5,
+            1.5,
+            -1e-30,
+            4_194_304.0,
+            -4_194_304.0,
+        ]
+        .map(f32::to_bits),
+    );
+    let device = evaluator(
+        &["veduta::noise::lattice::turn_3d"],
+        "",
+        "turn_3d(vec3f(1.0, in.f[0], 0.5)).y",
+        1,
+    );
+    let found = device.run_bits(&rows).unwrap();
+    let stated = crate::sweep::header_error("veduta::noise::lattice::turn_3d");
+    let mut worst = 0;
+    for (&row, found) in rows.iter().zip(found) {
+        let expected = turn_3d([float(row); 3])[1];
+        let error = found.wrapping_sub(expected).cast_signed().unsigned_abs();
+        worst = worst.max(error);
+        assert!(
+            f64::from(error) <= stated,
+            "{}: {found} {expected}",
+            float(row)
+        );
+    }
+    println!("turn_3d: error {worst} of 2^32");
+}
+
+#[test]
 fn fades_keep_their_bounds() {
     let fill = |random: &mut Random, row: &mut [u32]| row[0] = random_frac(random);
     for (name, arguments) in [("fade_2d", "vec2f(in.f[0])"), ("fade_3d", "vec3f(in.f[0])")] {
@@ -251,6 +298,14 @@ fn fades_keep_their_bounds() {
         });
         assert_eq!((s.low, s.high), (0.0, 1.0));
     }
+    let path = "veduta::noise::lattice::fade_centred_3d";
+    check(path, "vec3f(in.f[0] - 0.5)", 1, 1_000_000, fill, |row| {
+        Truth {
+            value: [fade_centred(float(row[0]) - 0.5); 4],
+            bar: [1e-6; 4],
+            kink: false,
+        }
+    });
     for (name, arguments) in [
         ("fade_slope_2d", "vec2f(in.f[0])"),
         ("fade_slope_3d", "vec3f(in.f[0])"),
@@ -335,7 +390,7 @@ fn jumps_across_faces(module: &str, kind: &str) -> f64 {
 
 #[test]
 fn row_l05_value_noise() {
-    use veduta::reference::hash::{lattice_hash_2d, lattice_hash_3d, unit_float};
+    use veduta::reference::hash::{lattice_hash_2d, lattice_word_3d, unit_float};
     let prefix = "veduta::noise::value::";
     let of = |name: &str| format!("{prefix}{name}");
     let near_ends = |s: crate::sweep::Summary| {
@@ -412,7 +467,7 @@ fn row_l05_value_noise() {
         rows2.extend([row[0], row[1], fracs[0], fracs[1], row[6]]);
         rows3.extend([row[0], row[1], row[2], fracs[0], fracs[1], fracs[2], row[6]]);
         numbers2.push(unit_float(lattice_hash_2d([point[0], point[1]], row[6])[0]));
-        numbers3.push(unit_float(lattice_hash_3d(point, row[6])[0]));
+        numbers3.push(f64::from(lattice_word_3d(point, row[6]) & 0x7f_ffff) / 2_f64.powi(23));
     }
     assert_eq!(flat.run(&rows2).unwrap(), numbers2);
     assert_eq!(solid.run(&rows3).unwrap(), numbers3);

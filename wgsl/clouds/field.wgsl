@@ -3,23 +3,19 @@
 //! symbols  relative position relative to the eye [m] · altitude [m] · density relative to a full cloud [1]
 #define_import_path veduta::clouds::field
 
-#import veduta::fractal::fbm::{fbm_value_3d_periodic_six}
-
-/// The period that stands for none: 2^20 cells, which eleven octaves still hold.
-const NO_PERIOD: i32 = 1048576;
+#import veduta::fractal::fbm::{fbm_value_3d_torus_six}
+#import veduta::noise::lattice::{turn_3d}
 
 /// A layer of clouds between two spheres around the planet.
 struct CloudLayer {
-    /// Lattice cell of the eye's foot point (altitude 0), in units of the wavelength.
-    cell: vec3<i32>,
-    /// Fraction within that cell, in [0, 1).
-    frac: vec3<f32>,
-    /// Wavelength of the first octave [m], > 0.
-    wavelength: f32,
-    /// Period of the lattice on every axis [cells]; 0: none (see NO_PERIOD).
-    period: i32,
-    /// Hurst exponent of the noise.
-    hurst: f32,
+    /// Where the eye's foot point (altitude 0) lies on the torus on which the clouds repeat, in turns of 2^32.
+    turn: vec3<u32>,
+    /// Turns a metre: 1 / (wavelength of the first octave times 2^period_doublings) [1/m].
+    turns_per_metre: f32,
+    /// The clouds repeat after 2 to this power cells of the first octave, in [1, 16].
+    period_doublings: u32,
+    /// What the amplitude falls by from octave to octave, in [0.0625, 1].
+    fall: f32,
     /// Altitude of the lower sphere [m].
     bottom: f32,
     /// Distance between the spheres [m].
@@ -53,7 +49,7 @@ struct CloudLayer {
 /// source  the usual remapping max(0, (n - (1 - coverage)) / coverage); floor 1e-6 under the divisor
 fn shape_coverage(n: f32, coverage: f32, uniformity: f32) -> f32 {
     let filled = mix(n, 1.0, uniformity);
-    return clamp((filled - (1.0 - coverage)) / max(coverage, 1e-6), 0.0, 1.0);
+    return clamp((filled - (1.0 - coverage)) * (1.0 / max(coverage, 1e-6)), 0.0, 1.0);
 }
 
 /// Density of the layer at a point given relative to the eye, whose altitude is `altitude`; 0 outside the layer.
@@ -64,9 +60,8 @@ fn shape_coverage(n: f32, coverage: f32, uniformity: f32) -> f32 {
 /// error   2e-5 abs of reference::clouds::cloud_density
 /// source  Leitner2022 ch. 4.5 (six octaves of value noise)
 fn cloud_density(layer: CloudLayer, relative: vec3<f32>, altitude: f32) -> f32 {
-    let place = layer.frac + vec3<f32>(relative.x, altitude, relative.z) / layer.wavelength;
-    let period = select(NO_PERIOD, layer.period, layer.period > 0);
-    let n = fbm_value_3d_periodic_six(layer.cell, place, vec3<i32>(period), layer.hurst, layer.seed);
+    let turn = layer.turn + turn_3d(vec3<f32>(relative.x, altitude, relative.z) * layer.turns_per_metre);
+    let n = fbm_value_3d_torus_six(turn, layer.period_doublings, layer.fall, layer.seed);
     let inside = altitude >= layer.bottom && altitude <= layer.bottom + layer.thickness;
     return select(0.0, shape_coverage(n, layer.coverage, layer.uniformity), inside);
 }

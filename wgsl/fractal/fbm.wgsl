@@ -8,9 +8,9 @@
 //! symbols  octaves number of octaves [1] · hurst Hurst exponent H, 1 smooth, 0 rough [1]
 #define_import_path veduta::fractal::fbm
 
-#import veduta::noise::lattice::{Lattice3d, split_2d, split_3d, wrap_3d, finer_2d, finer_3d, shifted_2d, shifted_3d, octave_seed, octave_frequency, octave_fall}
+#import veduta::noise::lattice::{Lattice3d, split_2d, split_3d, wrap_3d, finer_2d, finer_3d, shifted_2d, shifted_3d, octave_seed, octave_frequency, octave_fall, fade_centred_3d}
 #import veduta::noise::gradient::{gradient_at_2d, gradient_at_3d, gradient_at_2d_slope, gradient_at_3d_slope}
-#import veduta::noise::value::{value_between_3d}
+#import veduta::noise::value::{value_between_3d, value_plus_one_3d}
 
 /// fBm of gradient noise in 2D.
 ///
@@ -191,33 +191,40 @@ fn fbm_value_3d_periodic(
     return sum / max(total, 1.0);
 }
 
-/// `fbm_value_3d_periodic` with six octaves in a straight line: the cloud field. Without a loop it is cheaper, and a
-/// nested march does not run into the number of rounds after which a software device ends all loops (65,535).
+/// Octave i, plus 1, of a sum on a torus of 2^bits cells; `turn` is shifted already.
 ///
-/// domain  cell in [-2147483648, 2147483647] cell lin
-/// domain  frac in [0, 1] cell lin
-/// domain  period in [1, 32767] cell lin
-/// domain  hurst in [0, 2] 1 lin
+/// internal
+fn torus_octave_3d(turn: vec3<u32>, bits: u32, seed: u32) -> f32 {
+    let low = turn >> vec3<u32>(32u - bits);
+    let high = (low + 1u) & vec3<u32>((1u << bits) - 1u);
+    // The fraction less 1/2, by way of its 23 upper bits as those of a number in [1, 2).
+    let s = bitcast<vec3<f32>>(((turn << vec3<u32>(bits)) >> vec3<u32>(9u)) | vec3<u32>(0x3f800000u)) - 1.5;
+    return value_plus_one_3d(bitcast<vec3<i32>>(low), bitcast<vec3<i32>>(high), fade_centred_3d(s), seed);
+}
+
+/// Six octaves of value noise in 3D on a torus, divided by the sum of the amplitudes: the cloud field. It is
+/// `fbm_value_3d_periodic` with a period of 2^bits cells of octave 0 on each axis, at a position that is given in turns of
+/// that period, 2^32 of them a whole one: wrapping, doubling and shifting are then integer operations of one instruction.
+/// Without a loop it is cheaper, and a nested march does not run into the number of rounds after which a software device
+/// ends all loops (65,535). `fall` is what the amplitude falls by from octave to octave (see `octave_fall`).
+///
+/// domain  turn in [0, 4294967295] turn/2^32 lin
+/// domain  bits in [1, 16] 1 lin
+/// domain  fall in [0.0625, 1] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [0, 1] 1
-/// error   1e-6 abs of reference::fractal::fbm_value_3d_periodic
+/// error   1e-6 abs of reference::fractal::fbm_value_3d_torus_six
 /// source  Leitner2022 8.2; departs: normalised, periodic lattice
-fn fbm_value_3d_periodic_six(cell: vec3<i32>, frac: vec3<f32>, period: vec3<i32>, hurst: f32, seed: u32) -> f32 {
-    let fall = octave_fall(hurst);
-    let base = split_3d(cell, frac);
-    let p0 = Lattice3d(wrap_3d(base.cell, period), base.frac);
-    let p1 = finer_3d(p0);
-    let p2 = finer_3d(p1);
-    let p3 = finer_3d(p2);
-    let p4 = finer_3d(p3);
-    let p5 = finer_3d(p4);
-    let n0 = periodic_octave_3d(p0, period, 0, seed);
-    let n1 = periodic_octave_3d(p1, period << vec3<u32>(1u), 1, seed);
-    let n2 = periodic_octave_3d(p2, period << vec3<u32>(2u), 2, seed);
-    let n3 = periodic_octave_3d(p3, period << vec3<u32>(3u), 3, seed);
-    let n4 = periodic_octave_3d(p4, period << vec3<u32>(4u), 4, seed);
-    let n5 = periodic_octave_3d(p5, period << vec3<u32>(5u), 5, seed);
+fn fbm_value_3d_torus_six(turn: vec3<u32>, bits: u32, fall: f32, seed: u32) -> f32 {
+    // SHIFT_3D of octave 0, in turns.
+    let shift = vec3<u32>(11u, 13u, 25u) << vec3<u32>(26u - bits);
+    let n0 = torus_octave_3d(turn, bits, seed);
+    let n1 = torus_octave_3d(turn + (shift >> vec3<u32>(1u)), bits + 1u, octave_seed(seed, 1));
+    let n2 = torus_octave_3d(turn + (shift >> vec3<u32>(2u)), bits + 2u, octave_seed(seed, 2));
+    let n3 = torus_octave_3d(turn + (shift >> vec3<u32>(3u)), bits + 3u, octave_seed(seed, 3));
+    let n4 = torus_octave_3d(turn + (shift >> vec3<u32>(4u)), bits + 4u, octave_seed(seed, 4));
+    let n5 = torus_octave_3d(turn + (shift >> vec3<u32>(5u)), bits + 5u, octave_seed(seed, 5));
     let sum = n0 + fall * (n1 + fall * (n2 + fall * (n3 + fall * (n4 + fall * n5))));
     let total = 1.0 + fall * (1.0 + fall * (1.0 + fall * (1.0 + fall * (1.0 + fall))));
-    return min(sum / total, 1.0);
+    return clamp(sum * (1.0 / total) - 1.0, 0.0, 1.0);
 }

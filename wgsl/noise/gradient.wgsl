@@ -15,13 +15,13 @@
 //! symbols  cell lattice point [cell] · frac position within the cell [cell] · seed selects one of 2^32 noises [1]
 #define_import_path veduta::noise::gradient
 
-#import veduta::hash::lattice::{lattice_hash_2d, lattice_hash_3d}
+#import veduta::hash::lattice::{lattice_hash_2d, lattice_word_3d}
 #import veduta::noise::lattice::{Lattice2d, Lattice3d, split_2d, split_3d, fade_2d, fade_3d, fade_slope_2d, fade_slope_3d}
 
 const SIGN: u32 = 2147483648u;
-// The icosahedron's two coordinates times 1.3847.
-const LONG_SIDE: f32 = 1.177896174325070;
-const SHORT_SIDE: f32 = 0.727979870951364;
+// The icosahedron's two coordinates times 1.3847, 1.17789617 and 0.72797987, as bits.
+const LONG_SIDE: u32 = 0x3f96c54du;
+const SHORT_SIDE: u32 = 0x3f3a5ce4u;
 
 /// The vector at a lattice point in 2D: a random direction, length sqrt(2).
 ///
@@ -54,18 +54,16 @@ fn lattice_gradient_2d(cell: vec2<i32>, seed: u32) -> vec2<f32> {
 /// error   6e-8 abs of reference::noise::lattice_gradient_3d
 /// source  Leitner2022 3.7; departs: 24 directions
 fn lattice_gradient_3d(cell: vec3<i32>, seed: u32) -> vec3<f32> {
-    let h = lattice_hash_3d(cell, seed).x;
-    let swap = (h & 4u) != 0u;
-    let p = bitcast<f32>(bitcast<u32>(select(LONG_SIDE, SHORT_SIDE, swap)) ^ (h << 31u));
-    let q = bitcast<f32>(bitcast<u32>(select(SHORT_SIDE, LONG_SIDE, swap)) ^ ((h << 30u) & SIGN));
-    // Thirds of the word: the component that is 0.
-    let first = bitcast<i32>(h) < -715827882;
-    let second = bitcast<i32>(h) < 715827883;
-    return vec3<f32>(
-        select(select(p, q, second), 0.0, first),
-        select(select(q, 0.0, second), p, first),
-        select(select(0.0, p, second), q, first),
-    );
+    let word = lattice_word_3d(cell, seed);
+    let swap = (LONG_SIDE ^ SHORT_SIDE) & bitcast<u32>(bitcast<i32>(word << 11u) >> 31u);
+    let p = LONG_SIDE ^ swap ^ ((word << 9u) & SIGN);
+    let q = SHORT_SIDE ^ swap ^ ((word << 10u) & SIGN);
+    // Thirds of the 20 bits below say which component is 0. Signs of differences make masks, which cost less than choosing.
+    let share = bitcast<i32>(word & 0xfffffu);
+    let first = bitcast<u32>((share - 349526) >> 31u);
+    let third = bitcast<u32>((699050 - share) >> 31u);
+    let second = ~(first | third);
+    return bitcast<vec3<f32>>(vec3<u32>((q & second) | (p & third), (p & first) | (q & third), (q & first) | (p & second)));
 }
 
 /// Gradient noise at a normalised 2D position.

@@ -1,16 +1,17 @@
 //! Value noise: random numbers at the lattice points, joined by the quintic fade.
 //!
 //! The interpolant is a choice of ours, the source names none; with the quintic fade the second derivative is continuous.
-//! Sums of `a (1 - f) + b f` never leave [0, 1], not even by a rounding.
+//! In 2D sums of `a (1 - f) + b f` never leave [0, 1], not even by a rounding. In 3D the
+//! corners' numbers are the 23 lowest bits of a word, taken as the fraction of a number in [1, 2) without any conversion.
 //!
 //! source   Leitner2022 3.6; Perlin2002 Improving noise (quintic fade)
 //! symbols  cell lattice point [cell] · frac position within the cell [cell] · seed selects one of 2^32 noises [1]
 #define_import_path veduta::noise::value
 
-#import veduta::hash::lattice::{lattice_hash_2d, lattice_hash_3d}
+#import veduta::hash::lattice::{lattice_hash_2d, lattice_word_3d}
 #import veduta::noise::lattice::{split_2d, split_3d, wrap_3d, fade_2d, fade_3d, fade_slope_2d, fade_slope_3d}
 
-// 2^-24: the corners' numbers are 24-bit integers until the very end.
+// 2^-24: in 2D the corners' numbers are 24-bit integers until the very end.
 const CORNER_UNIT: f32 = 5.9604644775390625e-8;
 
 /// A corner's number in 2D, a 24-bit integer.
@@ -20,24 +21,36 @@ fn corner_value_2d(x: i32, y: i32, seed: u32) -> f32 {
     return f32(bitcast<i32>(lattice_hash_2d(vec2<i32>(x, y), seed).x >> 8u));
 }
 
-/// A corner's number in 3D, a 24-bit integer.
+/// A corner's number in 3D, in [1, 2).
 ///
 /// internal
 fn corner_value_3d(x: i32, y: i32, z: i32, seed: u32) -> f32 {
-    return f32(bitcast<i32>(lattice_hash_3d(vec3<i32>(x, y, z), seed).x >> 8u));
+    return bitcast<f32>((lattice_word_3d(vec3<i32>(x, y, z), seed) & 0x7fffffu) | 0x3f800000u);
 }
 
-/// Value noise between two opposite corners of a cell, which need not be neighbours: periodic lattices wrap them.
+/// Value noise plus 1 between two opposite corners of a cell, which need not be neighbours: periodic lattices wrap them.
+/// `f` is the faded fraction.
+///
+/// internal
+fn value_plus_one_3d(low: vec3<i32>, high: vec3<i32>, f: vec3<f32>, seed: u32) -> f32 {
+    let a00 = corner_value_3d(low.x, low.y, low.z, seed);
+    let a10 = corner_value_3d(low.x, high.y, low.z, seed);
+    let a01 = corner_value_3d(low.x, low.y, high.z, seed);
+    let a11 = corner_value_3d(low.x, high.y, high.z, seed);
+    let v00 = a00 + f.x * (corner_value_3d(high.x, low.y, low.z, seed) - a00);
+    let v10 = a10 + f.x * (corner_value_3d(high.x, high.y, low.z, seed) - a10);
+    let v01 = a01 + f.x * (corner_value_3d(high.x, low.y, high.z, seed) - a01);
+    let v11 = a11 + f.x * (corner_value_3d(high.x, high.y, high.z, seed) - a11);
+    let v0 = v00 + f.y * (v10 - v00);
+    let v1 = v01 + f.y * (v11 - v01);
+    return v0 + f.z * (v1 - v0);
+}
+
+/// Value noise between two opposite corners of a cell.
 ///
 /// internal
 fn value_between_3d(low: vec3<i32>, high: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
-    let f = fade_3d(frac);
-    let g = 1.0 - f;
-    let v00 = corner_value_3d(low.x, low.y, low.z, seed) * g.x + corner_value_3d(high.x, low.y, low.z, seed) * f.x;
-    let v10 = corner_value_3d(low.x, high.y, low.z, seed) * g.x + corner_value_3d(high.x, high.y, low.z, seed) * f.x;
-    let v01 = corner_value_3d(low.x, low.y, high.z, seed) * g.x + corner_value_3d(high.x, low.y, high.z, seed) * f.x;
-    let v11 = corner_value_3d(low.x, high.y, high.z, seed) * g.x + corner_value_3d(high.x, high.y, high.z, seed) * f.x;
-    return ((v00 * g.y + v10 * f.y) * g.z + (v01 * g.y + v11 * f.y) * f.z) * CORNER_UNIT;
+    return clamp(value_plus_one_3d(low, high, fade_3d(frac), seed) - 1.0, 0.0, 1.0);
 }
 
 /// Value noise in 2D.
@@ -143,5 +156,6 @@ fn value_noise_3d_slope(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> vec4<f32
     let along_x1 = (v101 - v001) * g.y + (v111 - v011) * f.y;
     let along_x = along_x0 * g.z + along_x1 * f.z;
     let along_y = (v10 - v00) * g.z + (v11 - v01) * f.z;
-    return vec4<f32>(v0 * g.z + v1 * f.z, df.x * along_x, df.y * along_y, df.z * (v1 - v0)) * CORNER_UNIT;
+    let n = clamp(v0 * g.z + v1 * f.z - 1.0, 0.0, 1.0);
+    return vec4<f32>(n, df.x * along_x, df.y * along_y, df.z * (v1 - v0));
 }

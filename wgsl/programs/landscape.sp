@@ -122,7 +122,7 @@ struct Content {
     clouds_thickness: f32,
     cloud_coverage: f32,
     cloud_scale: f32,
-    cloud_period: i32,
+    cloud_period_doublings: u32,
     cloud_density: f32,
     cloud_scattering: f32,
     cloud_absorption: f32,
@@ -138,8 +138,8 @@ struct Anchors {
     terrain_frac: vec2<f32>,
     rock_cell: vec3<i32>,
     rock_frac: vec3<f32>,
-    cloud_cell: vec3<i32>,
-    cloud_frac: vec3<f32>,
+    // In turns of 2^32.
+    cloud_turn: vec3<u32>,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -317,7 +317,7 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
 #endif
 #ifdef CLOUDS
 #ifndef LOW_QUALITY
-    let layer = CloudLayer(anchors.cloud_cell, anchors.cloud_frac, content.cloud_scale, content.cloud_period, 1.0,
+    let layer = CloudLayer(anchors.cloud_turn, 1.0 / (content.cloud_scale * f32(1u << content.cloud_period_doublings)), content.cloud_period_doublings, 0.5,
         content.clouds_height, content.clouds_thickness, content.cloud_coverage, 0.0,
         content.cloud_density * (content.cloud_scattering + content.cloud_absorption),
         content.cloud_scattering / max(content.cloud_scattering + content.cloud_absorption, 1e-20),
