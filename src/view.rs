@@ -168,11 +168,11 @@ pub struct View {
 }
 
 impl Default for View {
-    /// Looking along -Z from 300 m, with a vertical field of view of 60 degrees and the aspect 16:9.
+    /// Looking along -Z from 3000 m, above the peaks of the default terrain, with a vertical field of view of 60 degrees and the aspect 16:9.
     fn default() -> Self {
         View {
             eye: WorldPos {
-                cell: I64Vec3::new(0, 300, 0),
+                cell: I64Vec3::new(0, 3000, 0),
                 frac: Vec3::ZERO,
             },
             world_from_view: Mat4::IDENTITY,

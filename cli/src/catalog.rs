@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use veduta::program::{PresetTable, SceneTable};
 use veduta::{Preset, ProgramSet, Settings, Value};
 use veduta_compose::keys::Keys;
+use veduta_compose::naga::valid::Capabilities;
 use veduta_compose::settings::{Presets, Scene, View};
 use veduta_compose::sp::SpFile;
 use veduta_compose::{Composer, Diag, Diags, Library};
@@ -26,6 +27,26 @@ pub struct SourceArgs {
     /// Leave out what veduta ships
     #[arg(long)]
     pub no_shipped: bool,
+}
+
+/// A capability beyond WebGPU's core that shaders may need.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Claim {
+    /// Half precision: `enable f16`.
+    F16,
+    /// Operations over subgroups: `enable subgroups`.
+    Subgroups,
+}
+
+/// The capabilities that claims name.
+pub fn claimed(claims: &[Claim]) -> Capabilities {
+    let names = claims.iter().map(|claim| match claim {
+        Claim::F16 => "f16",
+        Claim::Subgroups => "subgroups",
+    });
+    names
+        .filter_map(veduta_compose::compose::capability)
+        .fold(Capabilities::empty(), |a, b| a | b)
 }
 
 /// A file's name without folder and ending, the file's name for messages, and its text.

@@ -9,8 +9,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use naga::valid::Capabilities;
-
 use crate::compose::{Composed, Composer};
 use crate::diag::{Diag, Diags};
 use crate::emit::{Emission, emit};
@@ -324,7 +322,7 @@ impl Build {
             .plug_ins(self.plug_ins.clone())
             .require_headers(self.own.is_some());
         for claim in &self.claims {
-            match capability(claim) {
+            match crate::compose::capability(claim) {
                 Some(capability) => composer = composer.claim(capability),
                 None => diags.push(
                     Diag::whole_file(
@@ -508,15 +506,6 @@ impl Build {
             variants.insert((features.clone(), BTreeMap::new()));
         }
         variants
-    }
-}
-
-/// The capability of a name.
-fn capability(name: &str) -> Option<Capabilities> {
-    match name {
-        "f16" => Some(Capabilities::SHADER_FLOAT16),
-        "subgroups" => Some(Capabilities::SUBGROUP),
-        _ => None,
     }
 }
 

@@ -927,6 +927,15 @@ pub struct Finished {
     pub info: ModuleInfo,
 }
 
+/// The capability beyond WebGPU's core of a name that can be claimed: `f16` or `subgroups`.
+pub fn capability(name: &str) -> Option<Capabilities> {
+    match name {
+        "f16" => Some(Capabilities::SHADER_FLOAT16),
+        "subgroups" => Some(Capabilities::SUBGROUP),
+        _ => None,
+    }
+}
+
 /// Makes plain WGSL of linked IR: readable names, only what the entry points reach (all functions if there is no entry
 /// point), validated, written.
 ///

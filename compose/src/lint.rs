@@ -161,10 +161,21 @@ fn imports(text: &str, scan: &Scan, library: &Library, faults: &mut Vec<Fault>) 
             continue;
         }
         match uses.get(import.local.as_str()) {
-            None => faults.push(fault(
-                import.at,
-                format!("`{}` is imported but never used", import.local),
-            )),
+            None => {
+                let found = fault(
+                    import.at,
+                    format!("`{}` is imported but never used", import.local),
+                );
+                // A name that reads like it and is nobody else's may be its misspelling.
+                let others = uses.keys().copied().filter(|word| {
+                    !imports.iter().any(|other| other.local == *word)
+                        && !scan.items.iter().any(|item| item.name == *word)
+                });
+                faults.push(match nearest(&import.local, others) {
+                    Some(near) => note(found, format!("is `{near}` a misspelling of it?")),
+                    None => found,
+                });
+            }
             Some(places) => {
                 let first = imports
                     .iter()

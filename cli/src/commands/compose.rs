@@ -10,7 +10,7 @@ use veduta_compose::link::Linker;
 use veduta_compose::settings::{Presets, Settings, resolve, split_set};
 use veduta_compose::{Diags, Library, compose::Composed};
 
-use crate::catalog::{Catalog, SourceArgs};
+use crate::catalog::{Catalog, Claim, SourceArgs, claimed};
 use crate::error::CliError;
 
 /// A language to write.
@@ -88,6 +88,9 @@ pub struct ComposeArgs {
     /// A folder for PROGRAM.STAGE.ENDING, or a file for one stage; stdout when left out
     #[arg(long)]
     pub out: Option<PathBuf>,
+    /// Allows what goes beyond WebGPU's core; may be repeated
+    #[arg(long, value_enum)]
+    pub claim: Vec<Claim>,
     /// Only this stage
     #[arg(long, value_enum)]
     pub stage: Option<Stage>,
@@ -122,8 +125,8 @@ pub fn run(args: &ComposeArgs) -> Result<(), CliError> {
             format!("a stage of `{}`: {}", composed.program, stages.join(", ")),
         ));
     }
-    // What the composer claims: nothing beyond WebGPU's core.
-    let capabilities = Linker::new(&Library::default()).capabilities();
+    let capabilities =
+        Linker::with_capabilities(&Library::default(), claimed(&args.claim)).capabilities();
     let mut texts: Vec<(String, Vec<u8>)> = Vec::new();
     for stage in wanted {
         let wgsl = with_values(&stage.wgsl, &composed, &settings);
@@ -235,9 +238,11 @@ pub fn compose(args: &ComposeArgs) -> Result<(Composed, Settings), CliError> {
         _ => catalog.preset_table(),
     };
     let settings = resolve(catalog.keys(), presets, &preset, scene.as_ref(), &sets)?;
-    let composed = catalog
-        .composer()?
-        .compose(&sp, &settings.flags(), &settings.sizes())?;
+    let composed = catalog.composer()?.claim(claimed(&args.claim)).compose(
+        &sp,
+        &settings.flags(),
+        &settings.sizes(),
+    )?;
     Ok((composed, settings))
 }
 

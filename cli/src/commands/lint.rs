@@ -8,7 +8,9 @@ use veduta_compose::keys::{KeyType, Keys};
 use veduta_compose::settings::{Presets, Scene, View, resolve};
 use veduta_compose::{Diag, Diags, Library};
 
-use crate::catalog::{FileKind, SourceArgs, Texts, composer, files_below, read, shown};
+use crate::catalog::{
+    Claim, FileKind, SourceArgs, Texts, claimed, composer, files_below, read, shown,
+};
 use crate::error::CliError;
 
 /// Up to so many flags, every combination of them is composed.
@@ -26,6 +28,9 @@ pub struct LintArgs {
     /// Every function of a module must have a header, as veduta's own modules do
     #[arg(long)]
     pub headers: bool,
+    /// Allows what goes beyond WebGPU's core; may be repeated
+    #[arg(long, value_enum)]
+    pub claim: Vec<Claim>,
     /// What may be imported and named beside what is checked.
     #[command(flatten)]
     pub sources: SourceArgs,
@@ -47,7 +52,7 @@ pub struct Report {
 /// # Errors
 /// [`CliError::Lint`] when there is a fault, and the faults of [`check`].
 pub fn run(args: &LintArgs) -> Result<(), CliError> {
-    let report = check(&args.paths, &args.sources, args.headers)?;
+    let report = check(&args.paths, &args.sources, args.headers, &args.claim)?;
     if args.json {
         let faults: Vec<_> = report.faults.iter().map(to_json).collect();
         println!("{:#}", serde_json::Value::Array(faults));
@@ -85,7 +90,12 @@ pub fn to_json(fault: &Diag) -> serde_json::Value {
 ///
 /// # Errors
 /// [`CliError::Missing`] and [`CliError::Read`] for paths; faults inside the files are the report's.
-pub fn check(paths: &[PathBuf], sources: &SourceArgs, headers: bool) -> Result<Report, CliError> {
+pub fn check(
+    paths: &[PathBuf],
+    sources: &SourceArgs,
+    headers: bool,
+    claims: &[Claim],
+) -> Result<Report, CliError> {
     let mut faults = Diags::new();
     let own = collect(paths, &mut faults)?;
     let mut all = Texts::load(sources)?;
@@ -104,7 +114,7 @@ pub fn check(paths: &[PathBuf], sources: &SourceArgs, headers: bool) -> Result<R
         files,
         ..Report::default()
     };
-    check_texts(&all, headers, &mut report, &mut faults);
+    check_texts(&all, headers, claims, &mut report, &mut faults);
     for fault in faults.0 {
         if reported.contains(&fault.file) && !report.faults.contains(&fault) {
             report.faults.push(fault);
@@ -195,7 +205,13 @@ fn kind_of(path: &Path, ending: &str, text: &str) -> Option<FileKind> {
     }
 }
 
-fn check_texts(all: &Texts, headers: bool, report: &mut Report, faults: &mut Diags) {
+fn check_texts(
+    all: &Texts,
+    headers: bool,
+    claims: &[Claim],
+    report: &mut Report,
+    faults: &mut Diags,
+) {
     for (name, file, text) in &all.views {
         if let Err(found) = View::parse(name, file, text) {
             faults.append(found);
@@ -242,7 +258,9 @@ fn check_texts(all: &Texts, headers: bool, report: &mut Report, faults: &mut Dia
             return;
         }
     };
-    let mut composer = composer(&library, keys.clone()).require_headers(headers);
+    let mut composer = composer(&library, keys.clone())
+        .require_headers(headers)
+        .claim(claimed(claims));
     faults.append(composer.check_modules());
     for (name, file, text) in &all.programs {
         let program = veduta_compose::sp::parse(file, text).and_then(|sp| composer.prepare(&sp));

@@ -138,3 +138,24 @@ fn broken_keys_and_clashes_are_told() {
         run.out
     );
 }
+
+#[test]
+fn half_precision_must_be_claimed() {
+    let dir = folder("lint_claim");
+    let text = "enable f16;\n#define_import_path own::half\n\nfn halve(x: f32) -> f32 { return f32(f16(x) * 0.5h); }\n";
+    std::fs::write(dir.join("half.wgsl"), text).unwrap();
+    let run = veduta(&dir, &["lint", "half.wgsl"]).bad(1, &["1 fault"]);
+    let message = "half.wgsl:1:8: `enable f16` needs the capability `f16`, which is not claimed";
+    assert!(run.out.contains(message), "{}", run.out);
+    veduta(&dir, &["lint", "--claim", "f16", "half.wgsl"]).good();
+    veduta(&dir, &["lint", "--claim", "f61", "half.wgsl"]).bad(2, &["f61"]);
+    std::fs::write(
+        dir.join("own.sp"),
+        "#PROGRAM{ own }#\n#COMPUTE{ #CODE{\nenable f16;\n#import own::half::halve\n@group(0) @binding(0) var<storage, read_write> values: array<f32>;\n@compute @workgroup_size(64)\nfn run(@builtin(global_invocation_id) id: vec3<u32>) { values[id.x] = halve(values[id.x]); }\n}# }#\n",
+    )
+    .unwrap();
+    let compose = ["compose", "own.sp", "--modules", ".", "--target", "wgsl"];
+    veduta(&dir, &compose).bad(1, &["`f16`", "not claimed"]);
+    let run = veduta(&dir, &[&compose[..], &["--claim", "f16"]].concat()).good();
+    assert!(run.out.contains("enable f16;"), "{}", run.out);
+}

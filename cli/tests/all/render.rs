@@ -518,3 +518,64 @@ fn bad_options_are_told() {
     let gpu = veduta::device::shared().unwrap();
     assert!(Renderer::new(gpu, job.catalog.set(), options, size, Output::Display).is_err());
 }
+
+/// What a pixel of V01 costs, of the presets that ratios divide by. The frozen baseline never changes: a difference here is
+/// a fault of the program, not of these numbers. Ways of rounding decide for a pixel or two whether a ray meets a crest,
+/// hence one part in a thousand.
+#[test]
+fn operation_counts_of_the_frozen_baseline() {
+    let dir = folder("render_counts");
+    let golden = [
+        (
+            "thesis",
+            [
+                ("noise", 3465.457, 6992.0),
+                ("density", 38.658, 64.0),
+                ("light", 463.896, 768.0),
+                ("air", 230.980, 288.0),
+            ],
+        ),
+        (
+            "thesis_skip",
+            [
+                ("noise", 996.999, 4806.0),
+                ("density", 29.397, 64.0),
+                ("light", 61.747, 708.0),
+                ("air", 230.980, 288.0),
+            ],
+        ),
+        (
+            "thesis_low",
+            [
+                ("noise", 352.606, 1445.0),
+                ("density", 0.0, 0.0),
+                ("light", 0.0, 0.0),
+                ("air", 84.0, 84.0),
+            ],
+        ),
+    ];
+    for (preset, counts) in golden {
+        veduta(
+            &dir,
+            &[
+                "render", "--preset", preset, "--view", "V01", "--size", "256x144", "--count",
+                "c.json",
+            ],
+        )
+        .good();
+        let found = json(&dir.join("c.json"));
+        for (what, mean, largest) in counts {
+            let of = |part: &str| found[what][part].as_f64().unwrap();
+            let (got_mean, got_largest) = (of("mean"), of("max"));
+            println!("{preset}: {what} {got_mean:.3}, at most {got_largest}");
+            assert!(
+                (got_mean - mean).abs() <= 1e-3 * mean,
+                "{preset} {what}: {got_mean} instead of {mean}"
+            );
+            assert!(
+                (got_largest - largest).abs() <= 0.02 * largest,
+                "{preset} {what}: at most {got_largest} instead of {largest}"
+            );
+        }
+    }
+}
