@@ -227,7 +227,7 @@ pub fn lattice_gradient_3d(cell: [i32; 3], seed: u32) -> [f64; 3] {
     let p = sign(22) * sides[0];
     let q = sign(21) * sides[1];
     // The third of their range in which the 20 lowest bits lie says which component is 0; the others follow cyclically.
-    let third = (word & 0xf_ffff) * 3 >> 20;
+    let third = ((word & 0xf_ffff) * 3) >> 20;
     match third {
         0 => [0.0, p, q],
         1 => [q, 0.0, p],
