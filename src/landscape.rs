@@ -42,9 +42,9 @@ pub struct Targets {
     pub depth_format: Option<wgpu::TextureFormat>,
     /// Samples a pixel of the pass, at least 1.
     pub sample_count: u32,
-    /// How depth grows.
+    /// How depth grows; the landscape neither reads nor writes depth yet, and every value gives the same picture.
     pub depth: Depth,
-    /// How the host projects.
+    /// How the host projects; as with depth, nothing depends on it yet.
     pub projection: Projection,
 }
 

@@ -163,7 +163,7 @@ pub struct View {
     pub time: f64,
     /// The sun.
     pub sun: Light,
-    /// The moon, if it gives light.
+    /// The moon, if it gives light; it is checked, but nothing is lit by it yet.
     pub moon: Option<Light>,
 }
 

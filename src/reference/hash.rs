@@ -99,12 +99,16 @@ pub fn lattice_hash_3d(cell: [i32; 3], seed: u32) -> [u32; 3] {
 
 /// One random word of a lattice point, of which the 23 lowest bits count.
 pub fn lattice_word_3d(cell: [i32; 3], seed: u32) -> u32 {
-    let multipliers = [747_796_405, 2_654_435_769, 2_246_822_519];
-    let [x, y, z] = std::array::from_fn(|axis| {
-        let word = cell[axis].cast_unsigned().wrapping_mul(multipliers[axis]);
-        word ^ (word >> 16)
-    });
-    let row = y.wrapping_add(z ^ spread(seed));
+    let fold = |word: u32| word ^ (word >> 16);
+    let mixed = |axis: usize, multiplier: u32, start: u32| {
+        let word = cell[axis].cast_unsigned();
+        fold(word.wrapping_mul(multiplier).wrapping_add(start))
+    };
+    let start = 1_013_904_223;
+    let x = mixed(0, 747_796_405, start).wrapping_mul(747_796_405);
+    let y = mixed(1, 2_654_435_769, start);
+    let z = mixed(2, 2_246_822_519, spread(seed).wrapping_add(start));
+    let row = y.wrapping_add(z);
     (x ^ row).wrapping_mul(row | 1)
 }
 

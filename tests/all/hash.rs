@@ -437,6 +437,104 @@ fn neighbours_are_not_correlated() {
     }
 }
 
+/// Power of a line's numbers at every frequency but 0, over its mean.
+fn largest_peak(values: &[f64]) -> f64 {
+    // Sums over halves, the fast Fourier transform, on pairs of real and imaginary part.
+    fn transform(v: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let n = v.len();
+        if n == 1 {
+            return v.to_vec();
+        }
+        let part =
+            |odd: usize| -> Vec<[f64; 2]> { v.iter().skip(odd).step_by(2).copied().collect() };
+        let (even, odd) = (transform(&part(0)), transform(&part(1)));
+        let turned: Vec<[f64; 2]> = odd
+            .iter()
+            .enumerate()
+            .map(|(k, [re, im])| {
+                let (s, c) = (-std::f64::consts::TAU * k as f64 / n as f64).sin_cos();
+                [re * c - im * s, re * s + im * c]
+            })
+            .collect();
+        let sum = |sign: f64| {
+            even.iter()
+                .zip(&turned)
+                .map(move |(e, t)| [e[0] + sign * t[0], e[1] + sign * t[1]])
+        };
+        sum(1.0).chain(sum(-1.0)).collect()
+    }
+    let spectrum = transform(&values.iter().map(|v| [*v, 0.0]).collect::<Vec<_>>());
+    let powers: Vec<f64> = spectrum[1..values.len() / 2]
+        .iter()
+        .map(|[re, im]| re * re + im * im)
+        .collect();
+    let mean = powers.iter().sum::<f64>() / powers.len() as f64;
+    powers.iter().fold(0.0_f64, |a, p| a.max(*p)) / mean
+}
+
+/// Single lines, not only averages over planes: no line is a saw-tooth, the one through the origin with seed 0 neither,
+/// none repeats more often than its 23 bits must, and none is the mirror of another.
+#[test]
+fn lines_of_the_cheap_word_are_random() {
+    const N: usize = 2048;
+    let number = |cell: [i32; 3], seed: u32| {
+        f64::from(lattice_word_3d(cell, seed) & 0x7f_ffff) / 2_f64.powi(23) - 0.5
+    };
+    let mut lines = vec![];
+    for axis in 0..3_usize {
+        for k in 0..600_i32 {
+            let (a, b) = if k == 0 {
+                (0, 0)
+            } else {
+                (k % 24 - 8, k / 24 - 8)
+            };
+            lines.push((axis, a, b, if k % 3 == 0 { 0 } else { k.cast_unsigned() }));
+        }
+    }
+    let peaks = parallel(&lines, |(axis, a, b, seed)| {
+        let values: Vec<f64> = (-1024..1024)
+            .map(|i| {
+                let cell = match axis {
+                    0 => [i, *a, *b],
+                    1 => [*a, i, *b],
+                    _ => [*a, *b, i],
+                };
+                number(cell, *seed)
+            })
+            .collect();
+        assert_eq!(values.len(), N);
+        largest_peak(&values)
+    });
+    // Of 1023 powers with an exponential distribution one in 2e5 lines passes 19 times the mean.
+    let worst = peaks.iter().fold(0.0_f64, |a, p| a.max(*p));
+    println!(
+        "largest spectral peak of {} lines: {worst:.1} times the mean",
+        lines.len()
+    );
+    assert!(worst < 19.0, "{worst}");
+
+    let mirrored: Vec<u32> = (1..4096_i32)
+        .map(|x| {
+            lattice_word_3d([x, 3, 5], 7).wrapping_sub(lattice_word_3d([-x, 3, 5], 7)) & 0xffff
+        })
+        .collect();
+    let distinct_differences = mirrored
+        .iter()
+        .collect::<std::collections::BTreeSet<_>>()
+        .len();
+    println!("{distinct_differences} distinct differences of 4095 mirrored pairs");
+    assert!(distinct_differences > 3600);
+
+    // Lines along x of 512 x 512 rows: pairs with equal numbers at three places, expected 2^35 / 2^23 = 4096.
+    let mut rows: Vec<[u32; 3]> = (0..512 * 512_i32)
+        .map(|k| [0, 1, 2].map(|x| lattice_word_3d([x, k % 512, k / 512], 9) & 0x7f_ffff))
+        .collect();
+    rows.sort_unstable();
+    let repeated = rows.windows(2).filter(|w| w[0] == w[1]).count();
+    println!("{repeated} repeated lines of 262144");
+    assert!(repeated < 5000, "{repeated}");
+}
+
 #[test]
 fn seeds_give_unrelated_hashes() {
     const N: u32 = 512;

@@ -24,6 +24,7 @@ const WORD_X: u32 = 747796405u;
 const WORD_Y: u32 = 2654435769u;
 const WORD_Z: u32 = 2246822519u;
 const WORD_SEED: u32 = 2654435761u;
+const WORD_START: u32 = 1013904223u;
 const SOURCE_SHIFT: f32 = 3250000.0;
 
 /// Two random words of a lattice point; for every seed a bijection of the point.
@@ -48,7 +49,7 @@ fn lattice_hash_3d(cell: vec3<i32>, seed: u32) -> vec3<u32> {
     return pcg_3d_keyed(bitcast<vec3<u32>>(cell), seed);
 }
 
-/// A coordinate of `lattice_word_3d`, multiplied and folded: a bijection.
+/// A word whose upper half is folded into the lower one: a bijection.
 ///
 /// internal
 fn fold(word: u32) -> u32 {
@@ -58,9 +59,10 @@ fn fold(word: u32) -> u32 {
 /// One random word of a lattice point, cheaply: its 23 lowest bits make good numbers, of which the upper ones are the best.
 /// The bits above are correlated over far distances.
 ///
-/// Every coordinate is multiplied and folded once, shared by all points that have it; a point itself costs one more
-/// multiplication, by an odd number that y and z make. For fixed y and z it is a bijection of x. It is neither a bijection
-/// of the point nor as thorough as `lattice_hash_3d`: bit k depends on bits 0 to k of the folded words only.
+/// Every coordinate is mixed once, shared by all points that have it; a point itself costs one more multiplication, by an
+/// odd number that y and z make. For fixed y and z it is a bijection of x. It is neither a bijection of the point nor as
+/// thorough as `lattice_hash_3d`: bit k depends on bits 0 to k of the mixed coordinates only, so that of two lines along x
+/// one pair in 2^23 has the same numbers.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
@@ -69,8 +71,9 @@ fn fold(word: u32) -> u32 {
 /// source  ours
 fn lattice_word_3d(cell: vec3<i32>, seed: u32) -> u32 {
     let p = bitcast<vec3<u32>>(cell);
-    let row = fold(p.y * WORD_Y) + (fold(p.z * WORD_Z) ^ (seed * WORD_SEED));
-    return (fold(p.x * WORD_X) ^ row) * (row | 1u);
+    // The increments keep 0 from being a fixed point, and the mirror of a product's bits far from the origin.
+    let row = fold(p.y * WORD_Y + WORD_START) + fold(p.z * WORD_Z + (seed * WORD_SEED + WORD_START));
+    return ((fold(p.x * WORD_X + WORD_START) * WORD_X) ^ row) * (row | 1u);
 }
 
 /// The source's chosen scheme in 2D: one PCG hash of the XOR of prime multiples.

@@ -42,6 +42,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #ifdef TERRAIN
 #import veduta::fractal::fbm::{fbm_3d}
 #import veduta::terrain::height::{Terrain}
+#import veduta::planet::shell::{altitude_of}
 #import veduta::terrain::march::{march}
 #import veduta::terrain::normal::{terrain_normal}
 #import veduta::terrain::shadow::{soft_shadow}
@@ -65,6 +66,9 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #ifndef LOW_QUALITY
 #import veduta::planet::shell::{shell_segment, clip_segment, segment_length}
 #import veduta::clouds::field::{CloudLayer}
+#ifdef ATMOSPHERE
+#import veduta::clouds::composite::{composite_clouds}
+#endif
 #ifdef CLOUD_SKIP
 #import veduta::clouds::march::{march_clouds_skip}
 #else
@@ -235,7 +239,7 @@ fn surface(dir: vec3<f32>, dir_right: vec3<f32>, dir_down: vec3<f32>, distance: 
     let footprint = max(distance * length(dir_right), 0.05);
     let normal = terrain_normal(land, content.planet_radius, view.eye_altitude, point, footprint, OCTAVES_NORMAL);
     (*work).noise += 4 * OCTAVES_NORMAL;
-    let altitude = view.eye_altitude + dot(point, up) - 0.5 * dot(point.xz, point.xz) / content.planet_radius;
+    let altitude = altitude_of(content.planet_radius, view.eye_altitude, point);
     let shadow = soft_shadow(land, content.planet_radius, view.eye_altitude, point, normal, view.to_sun,
         0.5 + 0.001 * distance, MAX_RENDERING_DISTANCE, content.shadow_softness, STEP_FACTOR, MARCH_EPSILON,
         MAX_MARCHING_STEPS_SHADOW, OCTAVES_SHADOW);
@@ -344,14 +348,14 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
         let middle = content.clouds_height + 0.5 * content.clouds_thickness;
         let mu = direction_cosine_along(content.planet_radius, view.eye_altitude, middle, view.to_sun.y,
             dot(dir, view.to_sun), cloud.mean_distance);
-        let lit = cloud.scatter * sunlight(middle, mu);
+        let at_clouds = sunlight(middle, mu);
 #ifdef ATMOSPHERE
         // The air in front of the clouds, which they do not dim.
         let front = march_sky(air(), view.eye_altitude, dir, view.to_sun, cloud.mean_distance, ATMOS_STEPS, ATMOS_LIGHT_STEPS);
         work.air += ATMOS_STEPS * (1 + ATMOS_LIGHT_STEPS);
-        color = front.in_scatter + front.transmittance * lit + cloud.transmittance * max(color - front.in_scatter, vec3<f32>(0.0));
+        color = composite_clouds(cloud, at_clouds, front, color);
 #else
-        color = lit + cloud.transmittance * color;
+        color = cloud.scatter * at_clouds + cloud.transmittance * color;
 #endif
     }
 #endif

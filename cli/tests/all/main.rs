@@ -4,6 +4,7 @@ mod ci_job;
 mod common;
 mod compose;
 mod eval;
+mod frozen;
 mod lint;
 mod list;
 mod render;

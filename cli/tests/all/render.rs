@@ -538,9 +538,9 @@ fn operation_counts_of_the_frozen_baseline() {
         (
             "thesis_skip",
             [
-                ("noise", 996.999, 4806.0),
-                ("density", 29.397, 64.0),
-                ("light", 61.747, 708.0),
+                ("noise", 1038.424, 6682.0),
+                ("density", 25.677, 64.0),
+                ("light", 72.372, 768.0),
                 ("air", 230.980, 288.0),
             ],
         ),
