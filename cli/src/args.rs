@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands;
 
-/// Outdoor landscapes for wgpu: render, compose, lint, list, eval.
+/// Outdoor landscapes for wgpu: render, compose, lint, list, bench, eval.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "veduta", version, about, arg_required_else_help = true)]
 pub struct Args {
@@ -25,6 +25,8 @@ pub enum Command {
     Lint(commands::lint::LintArgs),
     /// Show what there is: programs, presets, scenes, views, keys, adapters
     List(commands::list::ListArgs),
+    /// Measure run time against error
+    Bench(Box<commands::bench::BenchArgs>),
     /// Evaluate a WGSL expression over rows of numbers on the device
     Eval(commands::eval::EvalArgs),
 }
@@ -40,6 +42,7 @@ impl Args {
             Command::Compose(args) => commands::compose::run(args),
             Command::Lint(args) => commands::lint::run(args),
             Command::List(args) => commands::list::run(args),
+            Command::Bench(args) => commands::bench::run(args),
             Command::Eval(args) => commands::eval::run(args),
         }
     }

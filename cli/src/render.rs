@@ -116,6 +116,8 @@ pub struct Cost {
     pub longest: Duration,
     /// Bytes uploaded.
     pub bytes: u64,
+    /// Milliseconds by the device's timestamps, the sum over submissions; `None` unless they are in use.
+    pub gpu_ms: Option<f64>,
 }
 
 /// How long a tile's submission should take; far below the second after which systems lose patience.
@@ -136,6 +138,44 @@ pub struct Renderer {
     size: Size,
     output: Output,
     pipeline_time: Duration,
+    timer: Option<Timer>,
+}
+
+/// Two timestamps around a pass.
+#[derive(Debug)]
+struct Timer {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+}
+
+impl Timer {
+    const BYTES: u64 = 16;
+
+    fn new(device: &wgpu::Device) -> Timer {
+        Timer {
+            queries: device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("time"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2,
+            }),
+            resolved: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("time"),
+                size: wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT.max(Timer::BYTES),
+                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            }),
+        }
+    }
+
+    fn milliseconds(&self, gpu: &Gpu) -> Result<f64, CliError> {
+        let bytes = gpu.read_buffer(&self.resolved, Timer::BYTES)?;
+        let ticks: Vec<u64> = bytes
+            .chunks_exact(8)
+            .map(|b| u64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]))
+            .collect();
+        let ticks = ticks[1].saturating_sub(ticks[0]) as f64;
+        Ok(ticks * f64::from(gpu.queue.get_timestamp_period()) * 1e-6)
+    }
 }
 
 /// Runs `work` and turns the device's complaints into an error instead of a panic.
@@ -196,6 +236,7 @@ impl Renderer {
                 size,
                 output,
                 pipeline_time: start.elapsed(),
+                timer: None,
             })
         })
     }
@@ -213,6 +254,32 @@ impl Renderer {
     /// How long [`Landscape::new`] took.
     pub fn pipeline_time(&self) -> Duration {
         self.pipeline_time
+    }
+
+    /// Turns the device's timestamps on or off; they are off at first.
+    ///
+    /// # Errors
+    /// [`CliError::Argument`] when the device has none.
+    pub fn use_timestamps(&mut self, on: bool) -> Result<(), CliError> {
+        if on
+            && !self
+                .gpu
+                .device
+                .features()
+                .contains(wgpu::Features::TIMESTAMP_QUERY)
+        {
+            return Err(CliError::argument(
+                "clock",
+                "gpu",
+                "cpu or wall: this device has no timestamps",
+            ));
+        }
+        match (on, self.timer.is_some()) {
+            (true, false) => self.timer = Some(Timer::new(&self.gpu.device)),
+            (false, true) => self.timer = None,
+            _ => {}
+        }
+        Ok(())
     }
 
     /// Sets the number of the frame, which seeds the jitter.
@@ -235,13 +302,14 @@ impl Renderer {
     pub fn warm_up(&mut self, view: &View) -> Result<Cost, CliError> {
         let start = Instant::now();
         let cpu = CpuTime::now();
-        let bytes = self.submit(view, [0, 0, 1, 1])?;
+        let (bytes, gpu_ms) = self.submit(view, [0, 0, 1, 1])?;
         Ok(Cost {
             wall: start.elapsed(),
             cpu_ms: since(cpu.as_ref()),
             submissions: 1,
             longest: start.elapsed(),
             bytes,
+            gpu_ms,
         })
     }
 
@@ -278,7 +346,11 @@ impl Renderer {
             while x < width {
                 let columns = tile[0].min(width - x);
                 let begun = Instant::now();
-                cost.bytes += self.submit(view, [x, y, columns, rows])?;
+                let (bytes, gpu_ms) = self.submit(view, [x, y, columns, rows])?;
+                cost.bytes += bytes;
+                if let Some(ms) = gpu_ms {
+                    *cost.gpu_ms.get_or_insert(0.0) += ms;
+                }
                 let took = begun.elapsed();
                 cost.submissions += 1;
                 cost.longest = cost.longest.max(took);
@@ -298,11 +370,16 @@ impl Renderer {
     }
 
     /// Draws a rectangle `[x, y, width, height]` and waits for it.
-    fn submit(&mut self, view: &View, [x, y, w, h]: [u32; 4]) -> Result<u64, CliError> {
+    fn submit(
+        &mut self,
+        view: &View,
+        [x, y, w, h]: [u32; 4],
+    ) -> Result<(u64, Option<f64>), CliError> {
         let Renderer {
             gpu,
             landscape,
             target,
+            timer,
             ..
         } = self;
         let gpu = gpu.clone();
@@ -321,16 +398,25 @@ impl Renderer {
                             store: wgpu::StoreOp::Store,
                         },
                     })],
+                    timestamp_writes: timer.as_ref().map(|t| wgpu::RenderPassTimestampWrites {
+                        query_set: &t.queries,
+                        beginning_of_pass_write_index: Some(0),
+                        end_of_pass_write_index: Some(1),
+                    }),
                     ..Default::default()
                 });
                 pass.set_scissor_rect(x, y, w, h);
                 let _ = landscape.composite(&mut pass);
             }
+            if let Some(timer) = timer {
+                encoder.resolve_query_set(&timer.queries, 0..2, &timer.resolved, 0);
+            }
             gpu.queue.submit([encoder.finish()]);
             gpu.device
                 .poll(wgpu::PollType::wait_indefinitely())
                 .map_err(|e| veduta::Error::Device(e.to_string()))?;
-            Ok(work.bytes)
+            let ms = timer.as_ref().map(|t| t.milliseconds(&gpu)).transpose()?;
+            Ok((work.bytes, ms))
         })
     }
 

@@ -41,14 +41,14 @@ const STEPS: [Step; 5] = [
     },
     Step {
         name: "tests",
-        arguments: "test --release --workspace",
+        arguments: "test --release --workspace --features veduta-cli/flip",
         variable: None,
         tests: true,
     },
     // The same packages as above, so that only our own crates are compiled again.
     Step {
         name: "preset tests, low_quality",
-        arguments: "test --release --workspace --features veduta/low_quality,veduta-cli/low_quality --test all -- preset",
+        arguments: "test --release --workspace --features veduta/low_quality,veduta-cli/low_quality,veduta-cli/flip --test all -- preset",
         variable: None,
         tests: true,
     },
@@ -103,6 +103,7 @@ pub fn run(options: &Options) -> Result<(), Fault> {
     let paths = Paths::find()?;
     println!("== set-up");
     tools::rust_components(&paths, options)?;
+    tools::cpp_compiler(options)?;
     driver::before_build(options)?;
     let tools = [tools::spirv_val(options), tools::tint(&paths, options)];
     let skipped: Vec<String> = tools

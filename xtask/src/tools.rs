@@ -72,6 +72,29 @@ pub fn rust_components(paths: &Paths, options: &Options) -> Result<(), Fault> {
     run(&mut rustup).map_err(|why| fault(&why))
 }
 
+/// A C++ compiler, which the FLIP metric of the benchmarks is built with.
+pub fn cpp_compiler(options: &Options) -> Result<(), Fault> {
+    let works = || {
+        let compiler = std::env::var_os("CXX").unwrap_or_else(|| "c++".into());
+        answer(Command::new(compiler).arg("--version")).is_some()
+    };
+    if works() {
+        return Ok(());
+    }
+    let fault = |why: &str| {
+        format!(
+            "the FLIP metric is built with a C++ compiler, and {why}; `{}` brings one",
+            apt::line(&["g++"])
+        )
+    };
+    apt::install(&["g++"], options.install).map_err(|why| fault(&why))?;
+    if works() {
+        Ok(())
+    } else {
+        Err(fault("the package g++ brought no `c++`"))
+    }
+}
+
 /// `spirv-val` of the SPIR-V tools.
 pub fn spirv_val(options: &Options) -> Tool {
     let version = || answer(Command::new("spirv-val").arg("--version"));

@@ -1,5 +1,6 @@
 //! One module a command: its arguments and `run`.
 
+pub mod bench;
 pub mod compose;
 pub mod eval;
 pub mod lint;

@@ -1,5 +1,6 @@
 //! The command line from end to end.
 
+mod bench;
 mod ci_job;
 mod common;
 mod compose;

@@ -1,0 +1,347 @@
+//! One knob of one effect: time and cost against error.
+
+use std::path::Path;
+
+use serde_json::json;
+use veduta::{ProgramSet, Value};
+
+use super::plot::{Plot, Series};
+use super::timing::{Middle, Ratio, Rounds, in_turns};
+use super::{Bench, decibels, pareto, side_by_side, table, write_text};
+use crate::commands::render::{Job, write_json};
+use crate::error::CliError;
+use crate::image::write_png;
+use crate::metrics::{Difference, Picture};
+
+/// What is judged: it decides on the scene, and on what the converged picture is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Effect {
+    /// Clouds over a bare planet.
+    Clouds,
+    /// Sky and aerial perspective over a bare planet.
+    Atmosphere,
+    /// Mountains without air.
+    Terrain,
+    /// The mountains' textures.
+    Textures,
+    /// The whole landscape.
+    All,
+}
+
+impl Effect {
+    /// Scene, flags that leave other effects out, values of the converged textbook picture, rays in a pixel's row.
+    fn plan(
+        self,
+    ) -> (
+        &'static str,
+        &'static [(&'static str, Value)],
+        &'static [(&'static str, Value)],
+        u32,
+    ) {
+        const OFF: Value = Value::Flag(false);
+        const CLOUDS: [(&str, Value); 4] = [
+            ("CLOUD_STEPS", Value::Int(512)),
+            ("CLOUD_LIGHT_STEPS", Value::Int(32)),
+            ("CLOUD_SKIP", OFF),
+            ("CLOUD_JITTER", OFF),
+        ];
+        const AIR: [(&str, Value); 2] = [
+            ("ATMOS_STEPS", Value::Int(256)),
+            ("ATMOS_LIGHT_STEPS", Value::Int(64)),
+        ];
+        const GROUND: [(&str, Value); 5] = [
+            ("STEP_FACTOR", Value::Float(0.25)),
+            ("MAX_MARCHING_STEPS", Value::Int(1000)),
+            ("MAX_MARCHING_STEPS_SHADOW", Value::Int(200)),
+            ("TEXTURE_FILTERING", OFF),
+            ("TEXTURE_LOW_QUALITY", OFF),
+        ];
+        const ALL: [(&str, Value); 7] = [
+            CLOUDS[0], CLOUDS[1], CLOUDS[2], CLOUDS[3], GROUND[0], GROUND[1], GROUND[2],
+        ];
+        match self {
+            Effect::Clouds => ("sky", &[], &CLOUDS, 1),
+            Effect::Atmosphere => ("sky", &[("CLOUDS", OFF)], &AIR, 1),
+            Effect::Terrain => ("clear", &[("ATMOSPHERE", OFF)], &GROUND, 4),
+            Effect::Textures => ("clear", &[("ATMOSPHERE", OFF)], &GROUND, 4),
+            Effect::All => ("thesis", &[], &ALL, 4),
+        }
+    }
+}
+
+/// A key and its values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Knob {
+    /// The key.
+    pub key: String,
+    /// The values, checked against the key's domain.
+    pub values: Vec<Value>,
+}
+
+impl Knob {
+    /// Reads `KEY=a..b` (doubling from a up to b, both more than 0), `KEY=a,b,c`, or for a flag `KEY`.
+    ///
+    /// # Errors
+    /// [`CliError::Argument`] for another form; an unknown key or a value out of its domain.
+    pub fn parse(set: &ProgramSet, text: &str) -> Result<Knob, CliError> {
+        let fault = || {
+            CliError::argument(
+                "--knob",
+                text,
+                "KEY=FROM..TO (doubling), KEY=A,B,C or a flag's name",
+            )
+        };
+        let (name, list) = text.split_once('=').unwrap_or((text, "false,true"));
+        let key = set.key(name.trim())?;
+        let texts: Vec<String> = match list.split_once("..") {
+            None => list.split(',').map(|t| t.trim().to_owned()).collect(),
+            Some((from, to)) => {
+                let number = |t: &str| {
+                    t.trim()
+                        .parse::<f64>()
+                        .ok()
+                        .filter(|n| n.is_finite() && *n > 0.0)
+                };
+                let (Some(mut at), Some(to)) = (number(from), number(to)) else {
+                    return Err(fault());
+                };
+                let mut texts = Vec::new();
+                while at <= to * (1.0 + 1e-9) && texts.len() < 64 {
+                    texts.push(at.to_string());
+                    at *= 2.0;
+                }
+                texts
+            }
+        };
+        if texts.is_empty() {
+            return Err(fault());
+        }
+        let values = texts
+            .iter()
+            .map(|t| Ok(key.parse(t)?))
+            .collect::<Result<_, CliError>>()?;
+        Ok(Knob {
+            key: name.trim().to_owned(),
+            values,
+        })
+    }
+}
+
+/// One setting of the knob.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// The value.
+    pub value: Value,
+    /// Milliseconds.
+    pub time: Middle,
+    /// To the preset as it is.
+    pub ratio: Ratio,
+    /// Noise evaluations, cloud density samples, cloud light samples, atmosphere samples a pixel.
+    pub counts: [f64; 4],
+    /// From the converged picture.
+    pub difference: Difference,
+    /// Nothing that was measured is both faster and nearer.
+    pub on_front: bool,
+}
+
+/// Everything of one run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// Settings in the order of the knob's values.
+    pub entries: Vec<Entry>,
+    /// 8-bit pictures of the settings, then of the reference.
+    pub pictures: Vec<Vec<u8>>,
+    /// What the converged picture is.
+    pub reference: String,
+}
+
+/// Measures all values of a knob on a view with a preset.
+///
+/// # Errors
+/// Unknown names, values out of their domain, faults of the device.
+pub fn run(
+    bench: &Bench,
+    effect: Effect,
+    knob: &Knob,
+    preset: &str,
+    view: &str,
+    rounds: Rounds,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Report, CliError> {
+    let (scene, off, converged, samples) = effect.plan();
+    let job = |values: &[(&str, Value)]| -> Result<Job, CliError> {
+        bench.job(scene, preset, view, &[off, values].concat())
+    };
+    progress("reference");
+    let target = job(converged)?;
+    let reference: Picture = bench.reference(&target, 0.0, samples)?;
+    let exposure = bench.exposure(&target);
+    let mut jobs = vec![job(&[])?];
+    for value in &knob.values {
+        jobs.push(job(&[(knob.key.as_str(), *value)])?);
+    }
+    let mut subjects = jobs
+        .iter()
+        .map(|j| bench.subject(j, 0.0))
+        .collect::<Result<Vec<_>, _>>()?;
+    progress("times");
+    let times = in_turns(&mut subjects, &[0], bench.clock, rounds, &mut || {})?;
+    drop(subjects);
+    let mut entries = Vec::new();
+    let mut pictures = Vec::new();
+    for (k, value) in knob.values.iter().enumerate() {
+        progress(&format!("{}={value}", knob.key));
+        let job = &jobs[k + 1];
+        let picture = bench.picture(job, 0.0, 1)?;
+        let counts = job.operation_counts(&bench.gpu, bench.size, 0.0)?;
+        entries.push(Entry {
+            value: *value,
+            time: Middle::of(&times[k + 1]),
+            ratio: Ratio::of(&times[k + 1], &times[0]),
+            counts: counts.map(|c| c.0),
+            difference: picture.difference(&reference, exposure)?,
+            on_front: false,
+        });
+        pictures.push(picture.display(exposure));
+    }
+    pictures.push(reference.display(exposure));
+    let points: Vec<(f64, f64)> = entries
+        .iter()
+        .map(|e| (e.ratio.median, e.difference.relative_rmse))
+        .collect();
+    for k in pareto(&points) {
+        entries[k].on_front = true;
+    }
+    let values: Vec<String> = converged
+        .iter()
+        .map(|(key, value)| format!("{key}={value}"))
+        .collect();
+    Ok(Report {
+        entries,
+        pictures,
+        reference: format!("{}, {} rays a pixel", values.join(" "), samples * samples),
+    })
+}
+
+/// A table of a report.
+pub fn markdown(bench: &Bench, knob: &Knob, report: &Report, command: &str) -> String {
+    let mut text = format!(
+        "# {}: time against error\n\nWritten by `{command}`.\n\n{}",
+        knob.key,
+        bench.machine()
+    );
+    text += &format!(
+        "- reference: {}\n- `front`: nothing here is both faster and nearer to the reference\n\n",
+        report.reference
+    );
+    let mut rows = vec![
+        [
+            knob.key.as_str(),
+            "time [ms]",
+            "/ preset",
+            "noise",
+            "density",
+            "light",
+            "air",
+            "PSNR [dB]",
+            "FLIP",
+            "rel. RMSE",
+            "worst pixel",
+            "front",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    ];
+    for e in &report.entries {
+        let d = &e.difference;
+        let mut row = vec![
+            e.value.to_string(),
+            format!("{:.1}", e.time.median),
+            e.ratio.to_string(),
+        ];
+        row.extend(e.counts.map(|c| format!("{c:.1}")));
+        row.extend([
+            decibels(d.psnr),
+            d.flip.map_or("-".to_owned(), |f| format!("{f:.4}")),
+            format!("{:.5}", d.relative_rmse),
+            format!("{} at ({}, {})", d.worst.steps, d.worst.x, d.worst.y),
+            if e.on_front { "front" } else { "" }.to_owned(),
+        ]);
+        rows.push(row);
+    }
+    text + &table(&rows)
+}
+
+/// Writes table, JSON, plot and pictures into a folder.
+///
+/// # Errors
+/// [`CliError::Write`].
+pub fn write(
+    bench: &Bench,
+    knob: &Knob,
+    report: &Report,
+    command: &str,
+    folder: &Path,
+) -> Result<(), CliError> {
+    std::fs::create_dir_all(folder).map_err(|e| CliError::write(folder, e))?;
+    let name = knob.key.to_ascii_lowercase();
+    write_text(
+        &folder.join(format!("{name}.md")),
+        &markdown(bench, knob, report, command),
+    )?;
+    let entries: Vec<serde_json::Value> = report
+        .entries
+        .iter()
+        .map(|e| {
+            json!({
+                "value": e.value.to_string(), "time_ms": e.time.median, "ratio": e.ratio.median,
+                "uncertainty": e.ratio.uncertainty, "conclusive": e.ratio.conclusive(),
+                "noise": e.counts[0], "density": e.counts[1], "light": e.counts[2], "air": e.counts[3],
+                "psnr_db": e.difference.psnr, "flip": e.difference.flip, "relative_rmse": e.difference.relative_rmse,
+                "front": e.on_front,
+            })
+        })
+        .collect();
+    let document = json!({ "key": knob.key, "reference": report.reference, "entries": entries });
+    write_json(&folder.join(format!("{name}.json")), &document)?;
+    let points = |front: bool| -> Vec<(f64, f64, String)> {
+        let mut list: Vec<&Entry> = report
+            .entries
+            .iter()
+            .filter(|e| !front || e.on_front)
+            .collect();
+        list.sort_by(|a, b| a.ratio.median.total_cmp(&b.ratio.median));
+        list.iter()
+            .map(|e| {
+                let label = if front {
+                    String::new()
+                } else {
+                    e.value.to_string()
+                };
+                (e.ratio.median, e.difference.psnr, label)
+            })
+            .collect()
+    };
+    Plot {
+        title: &format!("{}: error against time", knob.key),
+        x: "time over that of the preset as it is (logarithmic)",
+        y: "PSNR against the converged picture [dB]",
+        log_x: true,
+        series: &[
+            Series {
+                name: "measured".to_owned(),
+                points: points(false),
+                joined: false,
+            },
+            Series {
+                name: "Pareto front".to_owned(),
+                points: points(true),
+                joined: true,
+            },
+        ],
+    }
+    .write(&folder.join(format!("{name}.svg")))?;
+    let (width, height) = (bench.size.width as usize, bench.size.height as usize);
+    let (w, h, rgb) = side_by_side(&report.pictures, width, height);
+    write_png(&folder.join(format!("{name}.png")), w, h, &rgb)
+}

@@ -1,0 +1,250 @@
+//! Times of subjects that are drawn in turns, and their ratios.
+//!
+//! On a machine that others use, the time of one draw means little: it wanders by tens of per cent from minute to minute.
+//! The ratio of two draws of one round wanders less, and the median of many rounds less still; how much less, the rounds
+//! say themselves.
+
+use veduta::{View, wgpu};
+
+use crate::error::CliError;
+use crate::render::{Renderer, Tiling, median};
+
+/// What is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Clock {
+    /// Timestamps of the device.
+    Gpu,
+    /// Processor time of the process, the driver's threads included: what a software device needs.
+    Cpu,
+    /// Time on the clock.
+    Wall,
+}
+
+impl Clock {
+    /// The clock that suits a device: processor time for one in software, else its timestamps, else the clock on the wall.
+    pub fn of(info: &wgpu::AdapterInfo, features: wgpu::Features) -> Clock {
+        if info.device_type == wgpu::DeviceType::Cpu && crate::cpu::CpuTime::now().is_some() {
+            Clock::Cpu
+        } else if features.contains(wgpu::Features::TIMESTAMP_QUERY) {
+            Clock::Gpu
+        } else {
+            Clock::Wall
+        }
+    }
+
+    /// What the times are, in words.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Clock::Gpu => "device timestamps",
+            Clock::Cpu => "process CPU time",
+            Clock::Wall => "wall time",
+        }
+    }
+}
+
+/// One thing that is drawn in turns with others.
+#[derive(Debug)]
+pub struct Subject {
+    /// The pipeline and its picture.
+    pub renderer: Renderer,
+    /// What it looks at.
+    pub view: View,
+}
+
+impl Subject {
+    /// Draws once; milliseconds by the clock.
+    ///
+    /// # Errors
+    /// Faults of the device; [`CliError::Argument`] for a clock that does not run here.
+    pub fn draw(&mut self, clock: Clock) -> Result<f64, CliError> {
+        self.renderer.use_timestamps(clock == Clock::Gpu)?;
+        let cost = self
+            .renderer
+            .draw(&self.view, Tiling::Adaptive, &mut |_| {})?;
+        let ms = match clock {
+            Clock::Gpu => cost.gpu_ms,
+            Clock::Cpu => cost.cpu_ms,
+            Clock::Wall => Some(cost.wall.as_secs_f64() * 1e3),
+        };
+        ms.ok_or_else(|| {
+            CliError::argument(
+                "--clock",
+                format!("{clock:?}"),
+                "one that runs on this system",
+            )
+        })
+    }
+}
+
+/// How many rounds there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rounds {
+    /// At least so many, 1 or more.
+    pub least: usize,
+    /// More, up to this, while a ratio is not conclusive.
+    pub most: usize,
+}
+
+/// Draws all subjects once a round after one warm-up draw each, in the order A B C, then C B A, and so on, so that a drift
+/// cancels; `[subject][round]` milliseconds. Ratios to the subjects `bases` decide whether more rounds follow.
+///
+/// # Errors
+/// Faults of the device.
+pub fn in_turns(
+    subjects: &mut [Subject],
+    bases: &[usize],
+    clock: Clock,
+    rounds: Rounds,
+    progress: &mut dyn FnMut(),
+) -> Result<Vec<Vec<f64>>, CliError> {
+    let mut times = vec![Vec::new(); subjects.len()];
+    for subject in subjects.iter_mut() {
+        subject.renderer.warm_up(&subject.view)?;
+    }
+    for round in 0..rounds.most.max(rounds.least).max(1) {
+        for turn in 0..subjects.len() {
+            let k = if round % 2 == 0 {
+                turn
+            } else {
+                subjects.len() - 1 - turn
+            };
+            let time = subjects[k].draw(clock)?;
+            times[k].push(time);
+            progress();
+        }
+        let settled = bases
+            .iter()
+            .all(|base| (0..times.len()).all(|k| Ratio::of(&times[k], &times[*base]).conclusive()));
+        if round + 1 >= rounds.least.max(1) && settled {
+            break;
+        }
+    }
+    Ok(times)
+}
+
+/// The middle of values and how far they scatter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Middle {
+    /// The median.
+    pub median: f64,
+    /// Quartiles.
+    pub quartiles: (f64, f64),
+}
+
+impl Middle {
+    /// Of at least one value; 0 of none.
+    pub fn of(values: &[f64]) -> Middle {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let at = |share: f64| {
+            let place = share * (sorted.len().max(1) - 1) as f64;
+            let (low, part) = (place.floor() as usize, place.fract());
+            let value = |i: usize| sorted.get(i).copied().unwrap_or(0.0);
+            value(low) + part * (value((low + 1).min(sorted.len().max(1) - 1)) - value(low))
+        };
+        Middle {
+            median: median(values.to_vec()).unwrap_or(0.0),
+            quartiles: (at(0.25), at(0.75)),
+        }
+    }
+}
+
+/// The ratio of the times of two subjects.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ratio {
+    /// The median of the rounds' ratios.
+    pub median: f64,
+    /// One standard error of that median, relative to it, from the scatter of the rounds: robust, as of a normal
+    /// distribution with the same median deviation. Infinite for fewer than three rounds.
+    pub uncertainty: f64,
+}
+
+/// Above this relative uncertainty a ratio says nothing: three of them make the 10 % that two runs may differ by.
+pub const CONCLUSIVE: f64 = 0.033;
+
+impl Ratio {
+    /// Round by round `times` over `base`.
+    pub fn of(times: &[f64], base: &[f64]) -> Ratio {
+        let ratios: Vec<f64> = times.iter().zip(base).map(|(t, b)| t / b).collect();
+        let Some(middle) = median(ratios.clone()) else {
+            return Ratio {
+                median: f64::NAN,
+                uncertainty: f64::INFINITY,
+            };
+        };
+        let deviations: Vec<f64> = ratios.iter().map(|r| (r - middle).abs()).collect();
+        let deviation = 1.4826 * median(deviations).unwrap_or(0.0);
+        // The median's standard error is sqrt(pi / 2) times the mean's.
+        let error = 1.2533 * deviation / (ratios.len() as f64).sqrt();
+        Ratio {
+            median: middle,
+            uncertainty: if ratios.len() < 3 {
+                f64::INFINITY
+            } else {
+                error / middle
+            },
+        }
+    }
+
+    /// Whether two runs can be expected to agree within 10 %.
+    pub fn conclusive(self) -> bool {
+        self.uncertainty <= CONCLUSIVE
+    }
+}
+
+impl std::fmt::Display for Ratio {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let digits = if self.median < 0.1 { 4 } else { 3 };
+        if self.conclusive() {
+            write!(f, "{:.digits$}", self.median)
+        } else {
+            write!(f, "({:.digits$}?)", self.median)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ratios_cancel_what_slows_a_whole_round() {
+        let load = [1.0, 1.9, 1.2, 0.8, 3.0];
+        let base: Vec<f64> = load.iter().map(|l| 10.0 * l).collect();
+        let half: Vec<f64> = load.iter().map(|l| 5.0 * l).collect();
+        let ratio = Ratio::of(&half, &base);
+        assert!((ratio.median - 0.5).abs() < 1e-12 && ratio.conclusive());
+        assert_eq!(ratio.to_string(), "0.500");
+    }
+
+    #[test]
+    fn a_wide_spread_is_no_conclusion() {
+        let base = [10.0; 5];
+        let wild = [5.0, 9.0, 7.0, 12.0, 3.0];
+        let ratio = Ratio::of(&wild, &base);
+        assert!(!ratio.conclusive() && ratio.to_string().contains('?'));
+        // Two rounds are none, however equal.
+        assert!(!Ratio::of(&[1.0, 1.0], &[1.0, 1.0]).conclusive());
+        assert!(Ratio::of(&[], &[]).median.is_nan());
+    }
+
+    #[test]
+    fn more_rounds_make_it_surer() {
+        // Scatter of 5 %: enough with many rounds, not with three.
+        let noisy = |n: usize| -> Vec<f64> {
+            (0..n)
+                .map(|i| 1.0 + 0.05 * ((i * 7919 % 13) as f64 / 6.0 - 1.0))
+                .collect()
+        };
+        let [few, many] = [4, 40].map(|n| Ratio::of(&noisy(n), &vec![1.0; n]).uncertainty);
+        assert!(many < 0.6 * few && many < CONCLUSIVE, "{few} {many}");
+    }
+
+    #[test]
+    fn quartiles_lie_between() {
+        let middle = Middle::of(&[4.0, 1.0, 3.0, 2.0, 5.0]);
+        assert_eq!((middle.median, middle.quartiles), (3.0, (2.0, 4.0)));
+        assert_eq!(Middle::of(&[7.0]).quartiles, (7.0, 7.0));
+        assert_eq!(Middle::of(&[]).median, 0.0);
+    }
+}

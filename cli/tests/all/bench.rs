@@ -1,0 +1,259 @@
+//! `veduta bench`, small.
+
+use veduta_cli::bench::knob::{self, Effect, Knob};
+use veduta_cli::bench::timing::{Clock, Rounds, in_turns};
+use veduta_cli::bench::{Bench, chapter6, presets};
+use veduta_cli::catalog::{Catalog, SourceArgs};
+use veduta_cli::commands::render::RenderArgs;
+use veduta_cli::render::Size;
+
+use crate::common::{folder, json, png, veduta};
+
+fn bench(clock: Clock, cache: Option<std::path::PathBuf>) -> Bench {
+    Bench {
+        gpu: veduta::device::shared().unwrap().clone(),
+        clock,
+        size: Size {
+            width: 48,
+            height: 27,
+        },
+        cache,
+        base: RenderArgs::default(),
+    }
+}
+
+const FEW: Rounds = Rounds { least: 3, most: 3 };
+
+#[test]
+fn more_cloud_steps_take_longer_and_come_nearer() {
+    let dir = folder("bench_knob");
+    let run = veduta(
+        &dir,
+        &[
+            "bench",
+            "--effect",
+            "clouds",
+            "--knob",
+            "CLOUD_STEPS=8..32",
+            "--size",
+            "48x27",
+            "--rounds",
+            "3",
+            "--most-rounds",
+            "3",
+            "--out",
+            "result",
+        ],
+    )
+    .good();
+    assert!(
+        run.out.contains("| CLOUD_STEPS |") && run.out.contains("front"),
+        "{}",
+        run.out
+    );
+    let report = json(&dir.join("result/cloud_steps.json"));
+    let entries = report["entries"].as_array().unwrap();
+    assert_eq!(entries.len(), 3);
+    for pair in entries.windows(2) {
+        let of = |k: usize, name: &str| pair[k][name].as_f64().unwrap();
+        assert!(of(1, "psnr_db") > of(0, "psnr_db") + 3.0, "{pair:?}");
+        assert!(of(1, "relative_rmse") < of(0, "relative_rmse"));
+        // Twice the steps are exactly twice the samples.
+        assert!((of(1, "density") / of(0, "density") - 2.0).abs() < 1e-9);
+    }
+    let (width, height, _) = png(&dir.join("result/cloud_steps.png"));
+    assert_eq!((width, height), (4 * 48 + 3 * 4, 27));
+    let plot = std::fs::read_to_string(dir.join("result/cloud_steps.svg")).unwrap();
+    for part in [
+        "PSNR against the converged picture [dB]",
+        "Pareto front",
+        "logarithmic",
+    ] {
+        assert!(plot.contains(part), "{part}");
+    }
+}
+
+#[test]
+fn knobs_are_read() {
+    let catalog = Catalog::load(&SourceArgs::default()).unwrap();
+    let values = |text: &str| -> Vec<String> {
+        let knob = Knob::parse(catalog.set(), text).unwrap();
+        knob.values.iter().map(|v| v.to_string()).collect()
+    };
+    assert_eq!(values("CLOUD_STEPS=8..70"), ["8", "16", "32", "64"]);
+    assert_eq!(values("CLOUD_STEPS=5,7"), ["5", "7"]);
+    assert_eq!(values("STEP_FACTOR=0.125..0.5"), ["0.125", "0.25", "0.5"]);
+    assert_eq!(values("TEXTURE_FILTERING"), ["false", "true"]);
+    for text in [
+        "CLOUD_STEP=1",
+        "CLOUD_STEPS=0..8",
+        "CLOUD_STEPS=9..8",
+        "CLOUD_STEPS=",
+        "CLOUD_STEPS=1.5",
+        "CLOUD_STEPS=1..x",
+        "",
+    ] {
+        assert!(Knob::parse(catalog.set(), text).is_err(), "{text}");
+    }
+}
+
+#[test]
+fn every_effect_has_a_converged_picture() {
+    let bench = bench(Clock::Wall, None);
+    let catalog = Catalog::load(&SourceArgs::default()).unwrap();
+    for (effect, knob) in [
+        (Effect::Atmosphere, "ATMOS_STEPS=8,16"),
+        (Effect::Terrain, "OCTAVES_NORMAL=6,11"),
+        (Effect::Textures, "TEXTURE_LOW_QUALITY"),
+    ] {
+        let knob = Knob::parse(catalog.set(), knob).unwrap();
+        let report = knob::run(&bench, effect, &knob, "thesis", "V01", FEW, &mut |_| {}).unwrap();
+        assert_eq!((report.entries.len(), report.pictures.len()), (2, 3));
+        for entry in &report.entries {
+            println!("{effect:?} {}: {:?}", entry.value, entry.difference);
+            assert!(entry.difference.psnr > 12.0 && entry.difference.psnr.is_finite());
+            assert!(entry.time.median > 0.0);
+        }
+        assert!(report.entries.iter().any(|e| e.on_front));
+    }
+}
+
+#[test]
+fn presets_are_compared_with_the_baseline_and_references_are_kept() {
+    let dir = folder("bench_presets");
+    let bench = bench(Clock::Wall, Some(dir.join("cache")));
+    let plan = presets::Plan {
+        scene: "thesis".to_owned(),
+        presets: vec!["thesis_low".to_owned()],
+        views: vec!["V08".to_owned()],
+        // Not converged; the test is of the bench.
+        reference: "thesis".to_owned(),
+        samples: 1,
+        rounds: FEW,
+    };
+    let entries = presets::run(&bench, &plan, &mut |_| {}).unwrap();
+    let names: Vec<&str> = entries.iter().map(|e| e.preset.as_str()).collect();
+    assert_eq!(names, ["thesis", "thesis_skip", "thesis_low"]);
+    assert_eq!(entries[0].to_thesis.median, 1.0);
+    assert_eq!(
+        entries[0].difference.psnr,
+        f64::INFINITY,
+        "the reference is the preset itself"
+    );
+    assert!(
+        entries[1].difference.psnr > 35.0,
+        "{:?}",
+        entries[1].difference
+    );
+    assert!(entries[2].to_thesis.median < 0.5 && entries[2].difference.psnr < 30.0);
+    // The second run takes the reference from the folder: a file that is changed shows.
+    let files: Vec<_> = std::fs::read_dir(dir.join("cache"))
+        .unwrap()
+        .map(|f| f.unwrap().path())
+        .collect();
+    assert_eq!(files.len(), 1);
+    let size = std::fs::metadata(&files[0]).unwrap().len();
+    assert_eq!(size, 48 * 27 * 12);
+    std::fs::write(&files[0], vec![0; size as usize]).unwrap();
+    let again = presets::run(&bench, &plan, &mut |_| {}).unwrap();
+    assert!(again[0].difference.psnr < 20.0);
+    let text = presets::markdown(&bench, &plan, &entries, "test");
+    for part in ["llvm", "## `thesis_low`", "| V08 ", "time / thesis_skip"] {
+        assert!(text.to_lowercase().contains(&part.to_lowercase()), "{part}");
+    }
+    assert_eq!(presets::to_json(&entries).as_array().unwrap().len(), 3);
+}
+
+#[test]
+fn row_l41_l42_l43_chapter_6_is_repeated() {
+    let dir = folder("bench_chapter6");
+    let bench = bench(Clock::Wall, None);
+    let plan = chapter6::Plan {
+        seconds: 4,
+        rounds: FEW,
+        quick: true,
+    };
+    let report = chapter6::run(&bench, &plan, &dir, &mut |_| {}).unwrap();
+    chapter6::write(&bench, &report, "test", &dir).unwrap();
+    // L41: low quality is faster in every frame.
+    assert_eq!(report.flight.len(), 4);
+    assert!(report.flight.iter().all(|s| s.normal > s.low));
+    // L42: more steps, more time, less error.
+    let at = |p, s| {
+        report
+            .sweep
+            .iter()
+            .find(|e| e.primary == p && e.secondary == s)
+            .unwrap()
+    };
+    assert_eq!(report.sweep.len(), 4);
+    assert!(at(32, 12).difference.psnr > at(16, 12).difference.psnr + 2.0);
+    assert!(at(32, 12).time.median > at(16, 6).time.median);
+    // L43: jitter turns stripes into noise.
+    let jitter = report.jitter[0];
+    assert!(jitter.stripes_on < 0.6 * jitter.stripes_off, "{jitter:?}");
+    for file in [
+        "chapter6.md",
+        "chapter6.json",
+        "flight.svg",
+        "cloud_steps.svg",
+        "jitter.png",
+        "jitter_16_error_x8.png",
+    ] {
+        assert!(dir.join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
+fn device_timestamps_agree_with_the_clock_on_the_wall() {
+    let bench = bench(Clock::Wall, None);
+    if !bench
+        .gpu
+        .device
+        .features()
+        .contains(veduta::wgpu::Features::TIMESTAMP_QUERY)
+    {
+        println!("this device has no timestamps");
+        return;
+    }
+    let job = bench.job("clear", "thesis", "V01", &[]).unwrap();
+    let mut subject = bench.subject(&job, 0.0).unwrap();
+    subject.renderer.warm_up(&subject.view).unwrap();
+    let mut shares = Vec::new();
+    for _ in 0..5 {
+        let device = subject.draw(Clock::Gpu).unwrap();
+        let wall = subject.draw(Clock::Wall).unwrap();
+        assert!(device > 0.0 && wall > 0.0);
+        shares.push(device / wall);
+    }
+    let share = veduta_cli::render::median(shares).unwrap();
+    println!("timestamps over wall time: {share:.2}");
+    assert!((0.2..2.0).contains(&share), "{share}");
+}
+
+#[test]
+fn a_subject_against_itself_has_the_ratio_1() {
+    let bench = bench(Clock::Cpu, None);
+    let job = bench.job("sky", "thesis_skip", "V01", &[]).unwrap();
+    let mut subjects = vec![
+        bench.subject(&job, 0.0).unwrap(),
+        bench.subject(&job, 0.0).unwrap(),
+    ];
+    let rounds = Rounds { least: 9, most: 9 };
+    let times = in_turns(&mut subjects, &[0], Clock::Cpu, rounds, &mut || {}).unwrap();
+    assert!(times.iter().all(|t| t.len() == 9));
+    let ratio = veduta_cli::bench::timing::Ratio::of(&times[1], &times[0]);
+    println!("against itself: {ratio} +- {:.3}", ratio.uncertainty);
+    assert!((0.6..1.6).contains(&ratio.median), "{ratio:?}");
+}
+
+#[test]
+fn wrong_arguments_are_named() {
+    let dir = folder("bench_wrong");
+    veduta(&dir, &["bench", "knob"]).bad(1, &["--knob", "CLOUD_STEPS=8..256"]);
+    veduta(&dir, &["bench", "--knob", "CLOUD_STEP=8..16"]).bad(1, &["CLOUD_STEP", "CLOUD_STEPS"]);
+    veduta(&dir, &["bench", "--knob", "CLOUD_STEPS=8..9999999"]).bad(1, &["CLOUD_STEPS"]);
+    veduta(&dir, &["bench", "presets", "--knob", "CLOUD_STEPS=8..16"]).bad(1, &["--knob"]);
+    veduta(&dir, &["bench", "--rounds", "0"]).bad(2, &["--rounds"]);
+    veduta(&dir, &["bench", "--views", "V99", "--size", "8x8"]).bad(1, &["V99"]);
+}
