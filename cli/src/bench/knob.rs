@@ -329,14 +329,14 @@ pub fn write(
         log_x: true,
         series: &[
             Series {
-                name: "measured".to_owned(),
-                points: points(false),
-                joined: false,
-            },
-            Series {
                 name: "Pareto front".to_owned(),
                 points: points(true),
                 joined: true,
+            },
+            Series {
+                name: "measured".to_owned(),
+                points: points(false),
+                joined: false,
             },
         ],
     }

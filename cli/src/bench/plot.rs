@@ -81,6 +81,7 @@ impl Plot<'_> {
                     .configure_mesh()
                     .x_desc(self.x)
                     .y_desc(self.y)
+                    .x_labels(16)
                     .light_line_style(WHITE)
                     .draw()?;
                 for (k, series) in self.series.iter().enumerate() {
