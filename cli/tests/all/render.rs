@@ -495,6 +495,12 @@ fn bad_options_are_told() {
     run(&["--camera", "0,1e9,0", "--out", "a.png"]).bad(1, &["altitude", "1000000000"]);
     run(&["--camera", "NaN,0,0", "--out", "a.png"]).bad(1, &["x of the eye", "NaN"]);
     run(&["--frames", "0", "--out", "a.png"]).bad(1, &["--frames", "at least 1"]);
+    for frames in ["10000001", "4294967295"] {
+        run(&["--frames", frames, "--out", "a.png"])
+            .bad(1, &["--frames", frames, "at most 10000000"]);
+    }
+    // The last of many moments is checked before the first is drawn.
+    run(&["--frames", "10000000", "--fps", "1e-7", "--out", "a.png"]).bad(1, &["of the eye"]);
     run(&["--frames", "2", "--fps", "0", "--out", "a.png"]).bad(1, &["--fps", "more than 0"]);
     std::fs::write(
         dir.join("bad.ron"),
