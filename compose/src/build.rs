@@ -10,7 +10,7 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use crate::compose::{Composed, Composer};
+use crate::compose::{Composed, Composer, Program};
 use crate::diag::{Diag, Diags, line_at};
 use crate::emit::{Emission, emit};
 use crate::keys::{KeyType, Keys};
@@ -385,8 +385,7 @@ impl Build {
                 continue;
             }
             for (features, origin) in self.variants_of(
-                &prepared.name,
-                &prepared.relevant,
+                &prepared,
                 composer.keys(),
                 &presets_read,
                 &preset_names,
@@ -485,18 +484,18 @@ impl Build {
     /// were asked for, with the sizes of the first preset unless a preset has these features already.
     fn variants_of(
         &self,
-        program: &str,
-        relevant: &BTreeSet<String>,
+        program: &Program,
         keys: &Keys,
         presets: &Presets,
         preset_names: &[String],
         scenes: &[Scene],
         diags: &mut Diags,
     ) -> Vec<(BTreeSet<String>, Origin)> {
+        let relevant = &program.relevant;
         let mut variants: Vec<(BTreeSet<String>, Origin)> = Vec::new();
         let mut of_program: Vec<Option<&Scene>> = scenes
             .iter()
-            .filter(|scene| scene.program == program)
+            .filter(|scene| scene.program == program.name)
             .map(Some)
             .collect();
         if of_program.is_empty() {
@@ -524,7 +523,11 @@ impl Build {
                 }
             }
         }
-        for (_, features) in self.variants.iter().filter(|(name, _)| name == program) {
+        for (_, features) in self
+            .variants
+            .iter()
+            .filter(|(name, _)| *name == program.name)
+        {
             let acting: BTreeSet<String> = features.intersection(relevant).cloned().collect();
             let declared = |name| keys.get(name).is_some_and(|key| key.ty == KeyType::Flag);
             if variants.iter().any(|(f, _)| *f == acting) && features.iter().all(|f| declared(f)) {

@@ -372,16 +372,16 @@ fn row_l38_every_parameter_exists_and_acts() {
 #[derive(Clone, Copy, PartialEq)]
 enum Acts {
     /// The ground and how it is lit; the sky stays.
-    OnGround,
+    Ground,
     /// The clouds; a scene without them stays, and so does the ground in front of them.
-    OnClouds,
+    Clouds,
     /// Everything.
-    OnAll,
+    Everything,
 }
 
 #[test]
 fn row_l38_every_quality_key_acts_where_it_should() {
-    use Acts::{OnAll, OnClouds, OnGround};
+    use Acts::{Clouds, Everything, Ground};
     let int = Value::Int;
     let float = Value::Float;
     let on = Value::Flag(true);
@@ -389,27 +389,27 @@ fn row_l38_every_quality_key_acts_where_it_should() {
     // Key, another value, what must be set beside it, what it acts on.
     type Case<'a> = (&'a str, Value, &'a [(&'a str, Value)], Acts);
     let cases: &[Case<'_>] = &[
-        ("TEXTURE_LOW_QUALITY", on, &[], OnGround),
-        ("TEXTURE_FILTERING", on, &[], OnGround),
-        ("FILTERING_SAMPLES", int(5), &filtered, OnGround),
-        ("SMOOTH_RIDGES", on, &[], OnGround),
-        ("MAX_MARCHING_STEPS", int(20), &[], OnGround),
-        ("MAX_MARCHING_STEPS_SHADOW", int(3), &[], OnGround),
-        ("STEP_FACTOR", float(0.3), &[], OnGround),
-        ("MARCH_EPSILON", float(20.0), &[], OnGround),
-        ("MAX_RENDERING_DISTANCE", float(5000.0), &[], OnGround),
-        ("OCTAVES", int(5), &[], OnGround),
-        ("OCTAVES_SHADOW", int(1), &[], OnGround),
-        ("OCTAVES_NORMAL", int(5), &[], OnGround),
-        ("CLOUD_STEPS", int(11), &[], OnClouds),
-        ("CLOUD_LIGHT_STEPS", int(5), &[], OnClouds),
-        ("MAX_CLOUD_DISTANCE", float(9000.0), &[], OnClouds),
-        ("CLOUD_SKIP", on, &[], OnClouds),
-        ("CLOUD_JITTER", on, &[], OnClouds),
-        ("ATMOS_STEPS", int(5), &[], OnAll),
-        ("ATMOS_LIGHT_STEPS", int(3), &[], OnAll),
-        ("LOW_QUALITY", on, &[], OnAll),
-        ("COUNT_OPERATIONS", on, &[], OnAll),
+        ("TEXTURE_LOW_QUALITY", on, &[], Ground),
+        ("TEXTURE_FILTERING", on, &[], Ground),
+        ("FILTERING_SAMPLES", int(5), &filtered, Ground),
+        ("SMOOTH_RIDGES", on, &[], Ground),
+        ("MAX_MARCHING_STEPS", int(20), &[], Ground),
+        ("MAX_MARCHING_STEPS_SHADOW", int(3), &[], Ground),
+        ("STEP_FACTOR", float(0.3), &[], Ground),
+        ("MARCH_EPSILON", float(20.0), &[], Ground),
+        ("MAX_RENDERING_DISTANCE", float(5000.0), &[], Ground),
+        ("OCTAVES", int(5), &[], Ground),
+        ("OCTAVES_SHADOW", int(1), &[], Ground),
+        ("OCTAVES_NORMAL", int(5), &[], Ground),
+        ("CLOUD_STEPS", int(11), &[], Clouds),
+        ("CLOUD_LIGHT_STEPS", int(5), &[], Clouds),
+        ("MAX_CLOUD_DISTANCE", float(9000.0), &[], Clouds),
+        ("CLOUD_SKIP", on, &[], Clouds),
+        ("CLOUD_JITTER", on, &[], Clouds),
+        ("ATMOS_STEPS", int(5), &[], Everything),
+        ("ATMOS_LIGHT_STEPS", int(3), &[], Everything),
+        ("LOW_QUALITY", on, &[], Everything),
+        ("COUNT_OPERATIONS", on, &[], Everything),
     ];
     for key in programs().keys.iter() {
         // A scene turns these on, and the target's format decides on the last.
@@ -433,12 +433,12 @@ fn row_l38_every_quality_key_acts_where_it_should() {
     let (clear, cloudy) = (picture("clear", &[]), picture("thesis", &[]));
     let clear_filtered = picture("clear", &filtered);
     for (key, value, beside, acts) in cases {
-        let scene = if *acts == OnGround { "clear" } else { "thesis" };
+        let scene = if *acts == Ground { "clear" } else { "thesis" };
         let changed = picture(scene, &[*beside, &[(*key, *value)]].concat());
         assert_eq!(changed.not_finite(), 0, "{key}");
         let base = match (*acts, beside.is_empty()) {
-            (OnGround, true) => &clear,
-            (OnGround, false) => &clear_filtered,
+            (Ground, true) => &clear,
+            (Ground, false) => &clear_filtered,
             _ => &cloudy,
         };
         let change = difference(base, &changed);
@@ -446,12 +446,12 @@ fn row_l38_every_quality_key_acts_where_it_should() {
         assert!(change > 1e-7, "{key} changes nothing");
         let (first, last) = (0..width, base.pixels.len() - width..base.pixels.len());
         match acts {
-            OnGround => assert_eq!(
+            Ground => assert_eq!(
                 base.pixels[first.clone()],
                 changed.pixels[first],
                 "{key} changes the sky"
             ),
-            OnClouds => {
+            Clouds => {
                 assert_eq!(
                     base.pixels[last.clone()],
                     changed.pixels[last],
@@ -460,7 +460,7 @@ fn row_l38_every_quality_key_acts_where_it_should() {
                 let without = picture("clear", &[(*key, *value)]);
                 assert_eq!(clear.pixels, without.pixels, "{key} acts without clouds");
             }
-            OnAll => {}
+            Everything => {}
         }
     }
 }
