@@ -11,7 +11,7 @@ use veduta_compose::{Composer, reflect};
 use crate::error::Error;
 use crate::program::{
     Binding, ComposedProgram, EntryPoint, Member, Override, ProgramSet, ScalarType, StageKind,
-    StageSource, StructLayout,
+    StageSource, StructLayout, Value,
 };
 
 /// The texts that programs are composed from: modules, programs and key declarations below some folders.
@@ -63,11 +63,25 @@ impl Source {
             .collect()
     }
 
-    /// Composes one variant of a program; flags that the program never mentions may be among the features.
+    /// Composes one variant of a program with the sizes as they are declared; flags that the program never mentions may
+    /// be among the features.
     ///
     /// # Errors
     /// [`Error::UnknownProgram`], and [`Error::Compose`] with every fault of the texts and its place.
     pub fn compose(&self, program: &str, features: &[&str]) -> Result<ComposedProgram, Error> {
+        self.compose_sized(program, features, &[])
+    }
+
+    /// [`Source::compose`] with other values for some sizes; those that the program never mentions do no harm.
+    ///
+    /// # Errors
+    /// As [`Source::compose`].
+    pub fn compose_sized(
+        &self,
+        program: &str,
+        features: &[&str],
+        sizes: &[(&str, i64)],
+    ) -> Result<ComposedProgram, Error> {
         let faults = |e: veduta_compose::Diags| Error::Compose(e.to_string());
         let programs = self.with_ending("sp");
         let stem = |file: &str| {
@@ -86,8 +100,10 @@ impl Source {
         let library = Library::from_sources(self.with_ending("wgsl")).map_err(faults)?;
         let sp = veduta_compose::sp::parse(file, text).map_err(faults)?;
         let features: BTreeSet<String> = features.iter().map(|f| (*f).to_owned()).collect();
+        let sizes: BTreeMap<String, i64> =
+            sizes.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
         let composed = Composer::new(&library, keys)
-            .compose(&sp, &features, &BTreeMap::new())
+            .compose(&sp, &features, &sizes)
             .map_err(faults)?;
         self::program(&composed)
     }
@@ -95,6 +111,8 @@ impl Source {
 
 impl ProgramSet {
     /// [`ProgramSet::get`], or the variant composed from `source` when the build has not made it; the set keeps it.
+    ///
+    /// The sizes are those of the set's default preset, as in a build that asks for a further variant.
     ///
     /// # Errors
     /// As [`Source::compose`].
@@ -105,7 +123,18 @@ impl ProgramSet {
         features: &[&str],
     ) -> Result<&ComposedProgram, Error> {
         if self.get(program, features).is_err() {
-            let composed = source.compose(program, features)?;
+            let preset = self.presets.iter().find(|p| p.name == self.default_preset);
+            let sizes: Vec<(&str, i64)> = preset
+                .iter()
+                .flat_map(|preset| preset.values.iter())
+                .filter_map(|(name, value)| match value {
+                    Value::Int(n) if self.key(name).is_ok_and(|key| key.ty == "size") => {
+                        Some((name.as_ref(), *n))
+                    }
+                    _ => None,
+                })
+                .collect();
+            let composed = source.compose_sized(program, features, &sizes)?;
             self.programs.to_mut().push(composed);
         }
         self.get(program, features)
@@ -123,7 +152,7 @@ pub struct Reloader {
 }
 
 impl Reloader {
-    /// Reads the folders and composes the program for the first time.
+    /// Reads the folders and composes the program for the first time, with the sizes as they are declared.
     ///
     /// # Errors
     /// As [`Source::read`] and [`Source::compose`].

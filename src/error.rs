@@ -26,7 +26,7 @@ pub enum Error {
     },
     /// The program exists, but not with these features.
     #[error(
-        "`{program}` was not built with the features {}; the nearest variant has {nearest}; build it, or turn on the feature `compose`",
+        "`{program}` was not built with the features {}; the nearest variant has {nearest}; build it, or compose it with `ProgramSet::get_or_compose` (feature `compose`)",
         list(.features)
     )]
     VariantNotBuilt {

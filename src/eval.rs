@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use veduta_compose::diag::{Diag, Diags, line_at};
 use veduta_compose::library::Library;
 use veduta_compose::link::{LinkInput, Linker};
 
@@ -78,6 +79,8 @@ pub struct Spec<'a> {
     pub imports: &'a [&'a str],
     /// WGSL to put before the entry point: functions, constants, `override fn`.
     pub prelude: &'a str,
+    /// The name of the prelude in messages, for instance its file's; `prelude` when empty.
+    pub prelude_file: &'a str,
     /// The expression.
     pub expression: &'a str,
     /// The number of columns of a row, at most [`MAX_COLUMNS`].
@@ -95,18 +98,107 @@ pub struct Evaluator {
     wgsl: String,
 }
 
-fn source(spec: &Spec<'_>, store: &str, width: usize) -> String {
-    let mut text = String::new();
-    for import in spec.imports {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "#import {import}");
+/// A text that the caller has given, and its lines in the text that is composed.
+struct Part<'a> {
+    file: &'a str,
+    text: String,
+    /// The line, from 1, on which it begins.
+    first: u32,
+    /// What stands before each of its lines.
+    before: &'static str,
+}
+
+impl Part<'_> {
+    fn lines(&self) -> u32 {
+        self.text.lines().count().max(1) as u32
     }
-    text.push_str(spec.prelude);
+
+    /// The place at its end, where what the caller has not closed is missed.
+    fn end(&self) -> (u32, u32) {
+        let last = self.text.lines().last().unwrap_or("");
+        (self.lines(), last.chars().count() as u32 + 1)
+    }
+}
+
+const IMPORT: &str = "#import ";
+
+/// What is composed, and where the caller's parts lie in it.
+struct Source<'a> {
+    text: String,
+    parts: Vec<Part<'a>>,
+}
+
+impl<'a> Source<'a> {
+    fn add(&mut self, file: &'a str, text: String, before: &'static str) {
+        let first = self.text.lines().count() as u32 + 1;
+        let text = text.replace("\r\n", "\n").replace('\r', "\n");
+        for line in text.lines() {
+            self.text.push_str(before);
+            self.text.push_str(line);
+            self.text.push('\n');
+        }
+        self.parts.push(Part {
+            file,
+            text,
+            first,
+            before,
+        });
+    }
+
+    /// Moves a fault to the part where it stands; one in the lines between them, to the end of the part before, which has
+    /// left something open.
+    fn place(&self, mut diag: Diag) -> Diag {
+        if diag.file != WHOLE || diag.line == 0 {
+            return diag;
+        }
+        let Some((expression, others)) = self.parts.split_last() else {
+            return diag;
+        };
+        // The statement that holds the expression begins on the line before it.
+        let part = if diag.line + 1 >= expression.first {
+            expression
+        } else {
+            let others = others.iter().rev().filter(|part| !part.text.is_empty());
+            others
+                .into_iter()
+                .find(|part| part.first <= diag.line)
+                .unwrap_or(expression)
+        };
+        let line = diag.line.saturating_sub(part.first) + 1;
+        (diag.line, diag.column) = if part.first > diag.line {
+            (1, 1)
+        } else if line <= part.lines() {
+            let before = part.before.chars().count() as u32;
+            (line, diag.column.saturating_sub(before).max(1))
+        } else {
+            part.end()
+        };
+        diag.file = part.file.to_owned();
+        diag.source_line = line_at(&part.text, diag.line).to_owned();
+        diag
+    }
+}
+
+/// The name of the whole text; it is never shown for a fault in a line.
+const WHOLE: &str = "expression";
+
+fn source<'a>(spec: &Spec<'a>, store: &str, width: usize) -> Source<'a> {
+    let mut source = Source {
+        text: String::new(),
+        parts: Vec::new(),
+    };
+    if !spec.imports.is_empty() {
+        source.add("import", spec.imports.join("\n"), IMPORT);
+    }
+    let prelude_file = match spec.prelude_file {
+        "" => "prelude",
+        name => name,
+    };
+    source.add(prelude_file, spec.prelude.to_owned(), "");
     let columns = spec.columns;
-    let _ = write!(
-        text,
-        "
-struct EvalRow {{ i: array<i32, {MAX_COLUMNS}>, u: array<u32, {MAX_COLUMNS}>, f: array<f32, {MAX_COLUMNS}> }}
+    let _ = writeln!(
+        source.text,
+        "struct EvalRow {{ i: array<i32, {MAX_COLUMNS}>, u: array<u32, {MAX_COLUMNS}>, f: array<f32, {MAX_COLUMNS}> }}
 @group(0) @binding(0) var<storage, read> eval_rows: array<u32>;
 @group(0) @binding(1) var<storage, read_write> eval_results: array<u32>;
 @compute @workgroup_size({WORKGROUP})
@@ -120,14 +212,17 @@ fn evaluate(@builtin(global_invocation_id) id: vec3<u32>) {{
         in.u[k] = bits;
         in.f[k] = bitcast<f32>(bits);
     }}
-    var value = {};
+    var value ="
+    );
+    source.add("expression", spec.expression.to_owned(), "");
+    let _ = writeln!(
+        source.text,
+        ";
     let base = row * {width}u;
     {store}
-}}
-",
-        spec.expression
+}}"
     );
-    text
+    source
 }
 
 fn result_type(module: &naga::Module) -> Result<(usize, ResultKind), Error> {
@@ -180,15 +275,18 @@ impl Evaluator {
         }
         let mut linker = Linker::new(library);
         let defs = BTreeMap::new();
-        let mut link = |text: &str| {
+        let mut link = |source: &Source<'_>| {
             linker
                 .link(&LinkInput {
-                    text,
-                    file: "expression",
+                    text: &source.text,
+                    file: WHOLE,
                     defs: &defs,
                     plug_ins: &[],
                 })
-                .map_err(|e| Error::Compose(e.to_string()))
+                .map_err(|found| {
+                    let faults = found.0.into_iter().map(|diag| source.place(diag));
+                    Error::Compose(Diags(faults.collect()).to_string())
+                })
         };
         let probe = link(&source(spec, "eval_results[base] = 0u;", 1))?;
         let (width, kind) = result_type(&probe)?;

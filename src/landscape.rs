@@ -190,7 +190,9 @@ impl Landscape {
     ///
     /// # Errors
     /// [`Error::OutOfDomain`] for a target that it cannot draw into; the faults of [`Settings::resolve`],
-    /// [`ProgramSet::get`] and [`crate::program::ComposedProgram::pipeline`].
+    /// [`ProgramSet::get`] and [`crate::program::ComposedProgram::pipeline`]. `get` finds what was built: for flags that no
+    /// shipped preset and scene turn on together, compose the variant into `programs` first, with
+    /// `ProgramSet::get_or_compose` (feature `compose`).
     pub fn new(
         device: &wgpu::Device,
         programs: &ProgramSet,

@@ -235,7 +235,8 @@ impl ProgramSet {
     ///
     /// # Errors
     /// [`Error::UnknownProgram`] when no variant has this program's name, and [`Error::VariantNotBuilt`], with the
-    /// nearest built feature set, when this one was not composed.
+    /// nearest built feature set, when this one was not composed: `ProgramSet::get_or_compose` (feature `compose`) does it at
+    /// run time.
     pub fn get(&self, program: &str, features: &[&str]) -> Result<&ComposedProgram, Error> {
         let of_program: Vec<&ComposedProgram> = self
             .programs

@@ -6,13 +6,14 @@
 //! ```
 //! and in the program `mod shaders { include!(concat!(env!("OUT_DIR"), "/veduta_programs.rs")); }`.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use crate::compose::{Composed, Composer};
-use crate::diag::{Diag, Diags};
+use crate::compose::{Composed, Composer, Program};
+use crate::diag::{Diag, Diags, line_at};
 use crate::emit::{Emission, emit};
-use crate::keys::Keys;
+use crate::keys::{KeyType, Keys};
 use crate::library::{Library, files_below, shown};
 use crate::lint::push_new;
 use crate::settings::{Presets, Scene, resolve};
@@ -346,7 +347,7 @@ impl Build {
         }
         diags.append(composer.check_modules());
 
-        let mut programs: BTreeMap<(String, Vec<String>), Composed> = BTreeMap::new();
+        let mut programs: BTreeMap<(String, Vec<String>), (Composed, Origin)> = BTreeMap::new();
         let mut known = BTreeSet::new();
         for path in &program_files {
             let file = shown(path);
@@ -383,20 +384,30 @@ impl Build {
                 ));
                 continue;
             }
-            for (features, sizes) in self.variants_of(
-                &prepared.name,
+            for (features, origin) in self.variants_of(
+                &prepared,
                 composer.keys(),
                 &presets_read,
                 &preset_names,
                 &scenes,
                 &mut diags,
             ) {
-                match composer.compose_prepared(&prepared, &features, &sizes) {
+                match composer.compose_prepared(&prepared, &features, &origin.sizes) {
                     Ok(composed) => {
-                        programs.insert(
-                            (composed.program.clone(), composed.features.clone()),
-                            composed,
-                        );
+                        let variant = (composed.program.clone(), composed.features.clone());
+                        match programs.entry(variant) {
+                            Entry::Vacant(free) => {
+                                free.insert((composed, origin));
+                            }
+                            Entry::Occupied(first) if first.get().0 == composed => {}
+                            Entry::Occupied(first) => {
+                                let (composed, first) = first.get();
+                                push_new(
+                                    &mut diags,
+                                    sizes_clash(composed, first, &origin, &presets_read, &named),
+                                );
+                            }
+                        }
                     }
                     Err(found) => {
                         for diag in found.0 {
@@ -428,7 +439,7 @@ impl Build {
         if !diags.is_empty() {
             return Err(diags);
         }
-        let programs: Vec<Composed> = programs.into_values().collect();
+        let programs: Vec<Composed> = programs.into_values().map(|(c, _)| c).collect();
         let default_preset = preset_names.first().cloned().unwrap_or_default();
         let rust = emit(&Emission {
             prefix: &self.prefix,
@@ -469,20 +480,22 @@ impl Build {
         ))
     }
 
-    /// The sets of features that a program is needed with: of each scene that names it, with each preset.
+    /// The sets of features that a program is needed with: of each scene that names it, with each preset; and those that
+    /// were asked for, with the sizes of the first preset unless a preset has these features already.
     fn variants_of(
         &self,
-        program: &str,
+        program: &Program,
         keys: &Keys,
         presets: &Presets,
         preset_names: &[String],
         scenes: &[Scene],
         diags: &mut Diags,
-    ) -> BTreeSet<(BTreeSet<String>, BTreeMap<String, i64>)> {
-        let mut variants = BTreeSet::new();
+    ) -> Vec<(BTreeSet<String>, Origin)> {
+        let relevant = &program.relevant;
+        let mut variants: Vec<(BTreeSet<String>, Origin)> = Vec::new();
         let mut of_program: Vec<Option<&Scene>> = scenes
             .iter()
-            .filter(|scene| scene.program == program)
+            .filter(|scene| scene.program == program.name)
             .map(Some)
             .collect();
         if of_program.is_empty() {
@@ -492,7 +505,15 @@ impl Build {
             for scene in &of_program {
                 match resolve(keys, presets, preset, *scene, &[]) {
                     Ok(settings) => {
-                        variants.insert((settings.flags(), settings.sizes()));
+                        let mut features = settings.flags();
+                        features.retain(|name| relevant.contains(name));
+                        let mut sizes = settings.sizes();
+                        sizes.retain(|name, _| relevant.contains(name));
+                        let known = |(f, o): &(_, Origin)| *f == features && o.sizes == sizes;
+                        if !variants.iter().any(known) {
+                            let preset = preset.clone();
+                            variants.push((features, Origin { preset, sizes }));
+                        }
                     }
                     Err(found) => {
                         for diag in found.0 {
@@ -502,11 +523,101 @@ impl Build {
                 }
             }
         }
-        for (_, features) in self.variants.iter().filter(|(name, _)| name == program) {
-            variants.insert((features.clone(), BTreeMap::new()));
+        for (_, features) in self
+            .variants
+            .iter()
+            .filter(|(name, _)| *name == program.name)
+        {
+            let acting: BTreeSet<String> = features.intersection(relevant).cloned().collect();
+            let declared = |name| keys.get(name).is_some_and(|key| key.ty == KeyType::Flag);
+            if variants.iter().any(|(f, _)| *f == acting) && features.iter().all(|f| declared(f)) {
+                continue;
+            }
+            let origin = variants.first().map(|(_, o)| o.clone()).unwrap_or_default();
+            // With the features that make no difference: they must be declared all the same.
+            variants.push((features.clone(), origin));
         }
         variants
     }
+}
+
+/// What a variant was composed for.
+#[derive(Clone, Debug, Default)]
+struct Origin {
+    preset: String,
+    /// The sizes that make a difference to the program.
+    sizes: BTreeMap<String, i64>,
+}
+
+/// Two presets that turn on the same features of a program but give it other sizes: whoever asks for the features could
+/// get either.
+fn sizes_clash(
+    composed: &Composed,
+    first: &Origin,
+    second: &Origin,
+    presets: &Presets,
+    texts: &[(String, String, String)],
+) -> Diag {
+    let value = |origin: &Origin, name: &str| origin.sizes.get(name).copied().unwrap_or_default();
+    let size = second
+        .sizes
+        .keys()
+        .find(|name| value(first, name) != value(second, name))
+        .map_or("", String::as_str);
+    // Where a preset or a base of it gives the size its value.
+    let setting = |origin: &Origin| {
+        presets
+            .chain(&origin.preset)
+            .into_iter()
+            .find_map(|preset| {
+                let setting = preset.values.iter().find(|s| s.key == size)?;
+                Some((preset.file.as_str(), setting.place))
+            })
+    };
+    let says = |origin: &Origin| {
+        format!(
+            "preset `{}` sets it to {}",
+            origin.preset,
+            value(origin, size)
+        )
+    };
+    // One of the two differs from the declaration, so that a preset sets it.
+    let (here, other) = match setting(second) {
+        Some(_) => (second, first),
+        None => (first, second),
+    };
+    let message = format!(
+        "size `{size}` is {} here and {} in preset `{}`, but program `{}` has the same features in both{}",
+        value(here, size),
+        value(other, size),
+        other.preset,
+        composed.program,
+        match composed.features.as_slice() {
+            [] => " (none)".to_owned(),
+            features => format!(" ({})", features.join(", ")),
+        }
+    );
+    let diag = match setting(here) {
+        Some((file, place)) => {
+            let text = texts.iter().find(|(_, name, _)| name == file);
+            let line = text.map_or("", |(.., text)| line_at(text, place.line));
+            Diag::new(file, place.line, place.column, line, message)
+        }
+        None => Diag::whole_file("build.rs", message),
+    };
+    let diag = match setting(other) {
+        Some((file, place)) => diag.note(format!(
+            "{}: {file}:{}:{}",
+            says(other),
+            place.line,
+            place.column
+        )),
+        None => diag.note(format!(
+            "preset `{}` leaves it as it is declared",
+            other.preset
+        )),
+    };
+    diag.note("a variant is told by its program and its features alone: let a flag of the program differ too, or compose the presets in two builds")
 }
 
 /// The file name without folder and ending.

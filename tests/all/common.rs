@@ -26,6 +26,7 @@ pub fn evaluator(imports: &[&str], prelude: &str, expression: &str, columns: usi
     let spec = Spec {
         imports,
         prelude,
+        prelude_file: "",
         expression,
         columns,
     };

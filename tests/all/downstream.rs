@@ -316,6 +316,22 @@ fn shipped_text(preset: Preset) -> String {
     program.stage(StageKind::Fragment).unwrap().wgsl.to_string()
 }
 
+/// This very build, in either of its two runs.
+#[test]
+fn the_default_preset_follows_the_cargo_feature() {
+    let (wanted, clouds) = if cfg!(feature = "low_quality") {
+        (Preset::ThesisLow, false)
+    } else {
+        (Preset::Thesis, true)
+    };
+    assert_eq!(Preset::default(), wanted);
+    let name = Preset::default().name(veduta::programs()).to_owned();
+    assert_eq!(veduta::programs().default_preset, name);
+    let text = shipped_text(Preset::default());
+    assert_eq!(text, shipped_text(wanted));
+    assert_eq!(text.contains("march_clouds"), clouds);
+}
+
 #[test]
 fn three_ways_of_switching_and_what_a_rebuild_does() {
     let _alone = alone();
@@ -333,18 +349,13 @@ fn three_ways_of_switching_and_what_a_rebuild_does() {
     assert_ne!(normal, low);
     assert!(normal.contains("march_clouds") && !low.contains("march_clouds"));
 
-    // 1. The Cargo feature. Without it, the default is the other one: that is this very build, in one of its two runs.
+    // 1. The Cargo feature. Without it, the default is the other one.
     let feature = Report::of("downstream_feature");
     feature.says("preset thesis_low");
     feature.says("value LOW_QUALITY true");
     assert_eq!(feature.text, low);
     assert!(feature.embeds(&low));
-    let default = if cfg!(feature = "low_quality") {
-        &low
-    } else {
-        &normal
-    };
-    assert_eq!(&shipped_text(Preset::default()), default);
+    // See `the_default_preset_follows_the_cargo_feature`.
 
     // 2. A shipped preset that the user's build.rs names: nothing else is embedded.
     let named = Report::of("downstream_named_preset");
@@ -491,7 +502,7 @@ fn a_user_pays_at_most_20_crates_more_than_for_wgpu_alone() {
 }
 
 #[test]
-fn composing_everything_takes_at_most_3_seconds_and_repeats_byte_by_byte() {
+fn composing_every_preset_takes_at_most_3_seconds_and_repeats_byte_by_byte() {
     let _alone = alone();
     // What the build script does, by the same code in the same optimisation.
     let build = veduta_compose::Build::of_veduta(root().join("wgsl"), root().join("presets"));

@@ -250,18 +250,9 @@ fn row_l34_jitter_trades_stripes_for_noise() {
     }
 }
 
+/// That the eye moves as it should is a test of the command line, which places it.
 #[test]
-fn row_l37_the_flight_follows_the_ground_and_moves_the_world() {
-    for time in [0.0, 1.0, 60.0, 1e6] {
-        let view = frozen("V01", time);
-        let ground = ground_height(view.eye);
-        assert!(
-            (view.eye.altitude() - ground - 300.0).abs() < 1e-3,
-            "{time}"
-        );
-        let flown = frozen("V01", 0.0).eye.to_metres().z - view.eye.to_metres().z;
-        assert!((flown - 50.0 * time).abs() < 1e-3, "{time}: {flown} m");
-    }
+fn a_moved_eye_sees_other_ground_and_other_clouds() {
     let mut land = landscape("thesis", "thesis", &[("CLOUD_STEPS", Value::Int(8))]);
     let size = [48, 27];
     let start = draw(&mut land, &frozen("V01", 0.0), size, HDR);
@@ -377,8 +368,147 @@ fn row_l38_every_parameter_exists_and_acts() {
     assert_eq!(draw(&mut land, &view, SMALL, HDR).pixels, base.pixels);
 }
 
+/// What a quality key acts on, and with that what it must leave as it is.
+#[derive(Clone, Copy, PartialEq)]
+enum Acts {
+    /// The ground and how it is lit; the sky stays.
+    Ground,
+    /// The clouds; a scene without them stays, and so does the ground in front of them.
+    Clouds,
+    /// Everything.
+    Everything,
+}
+
 #[test]
-fn row_l39_low_quality_leaves_clouds_out_and_is_twice_as_fast() {
+fn row_l38_every_quality_key_acts_where_it_should() {
+    use Acts::{Clouds, Everything, Ground};
+    let int = Value::Int;
+    let float = Value::Float;
+    let on = Value::Flag(true);
+    let filtered = [("TEXTURE_FILTERING", on)];
+    // Key, another value, what must be set beside it, what it acts on.
+    type Case<'a> = (&'a str, Value, &'a [(&'a str, Value)], Acts);
+    let cases: &[Case<'_>] = &[
+        ("TEXTURE_LOW_QUALITY", on, &[], Ground),
+        ("TEXTURE_FILTERING", on, &[], Ground),
+        ("FILTERING_SAMPLES", int(5), &filtered, Ground),
+        ("SMOOTH_RIDGES", on, &[], Ground),
+        ("MAX_MARCHING_STEPS", int(20), &[], Ground),
+        ("MAX_MARCHING_STEPS_SHADOW", int(3), &[], Ground),
+        ("STEP_FACTOR", float(0.3), &[], Ground),
+        ("MARCH_EPSILON", float(20.0), &[], Ground),
+        ("MAX_RENDERING_DISTANCE", float(5000.0), &[], Ground),
+        ("OCTAVES", int(5), &[], Ground),
+        ("OCTAVES_SHADOW", int(1), &[], Ground),
+        ("OCTAVES_NORMAL", int(5), &[], Ground),
+        ("CLOUD_STEPS", int(11), &[], Clouds),
+        ("CLOUD_LIGHT_STEPS", int(5), &[], Clouds),
+        ("MAX_CLOUD_DISTANCE", float(9000.0), &[], Clouds),
+        ("CLOUD_SKIP", on, &[], Clouds),
+        ("CLOUD_JITTER", on, &[], Clouds),
+        ("ATMOS_STEPS", int(5), &[], Everything),
+        ("ATMOS_LIGHT_STEPS", int(3), &[], Everything),
+        ("LOW_QUALITY", on, &[], Everything),
+        ("COUNT_OPERATIONS", on, &[], Everything),
+    ];
+    for key in programs().keys.iter() {
+        // A scene turns these on, and the target's format decides on the last.
+        let elsewhere = ["TERRAIN", "ATMOSPHERE", "CLOUDS", "OUTPUT"];
+        let known = cases.iter().any(|(name, ..)| key.name == *name);
+        assert!(
+            key.kind == KeyKind::Content || elsewhere.contains(&key.name.as_ref()) || known,
+            "no case for {}",
+            key.name
+        );
+    }
+    // A low sun, so that there are shadows.
+    let mut view = frozen("V01", 0.0);
+    view.sun.to_light = direction(0.15, 2.0).as_vec3();
+    let width = SMALL[0] as usize;
+    let picture = |scene: &str, beside: &[(&str, Value)]| {
+        let cheap = [("CLOUD_STEPS", int(8)), ("CLOUD_LIGHT_STEPS", int(3))];
+        let values = [&cheap, beside].concat();
+        draw(&mut landscape("thesis", scene, &values), &view, SMALL, HDR)
+    };
+    let (clear, cloudy) = (picture("clear", &[]), picture("thesis", &[]));
+    let clear_filtered = picture("clear", &filtered);
+    for (key, value, beside, acts) in cases {
+        let scene = if *acts == Ground { "clear" } else { "thesis" };
+        let changed = picture(scene, &[*beside, &[(*key, *value)]].concat());
+        assert_eq!(changed.not_finite(), 0, "{key}");
+        let base = match (*acts, beside.is_empty()) {
+            (Ground, true) => &clear,
+            (Ground, false) => &clear_filtered,
+            _ => &cloudy,
+        };
+        let change = difference(base, &changed);
+        println!("{key} = {value} changes the picture by {change:.2e}");
+        assert!(change > 1e-7, "{key} changes nothing");
+        let (first, last) = (0..width, base.pixels.len() - width..base.pixels.len());
+        match acts {
+            Ground => assert_eq!(
+                base.pixels[first.clone()],
+                changed.pixels[first],
+                "{key} changes the sky"
+            ),
+            Clouds => {
+                assert_eq!(
+                    base.pixels[last.clone()],
+                    changed.pixels[last],
+                    "{key} changes the ground"
+                );
+                let without = picture("clear", &[(*key, *value)]);
+                assert_eq!(clear.pixels, without.pixels, "{key} acts without clouds");
+            }
+            Everything => {}
+        }
+    }
+}
+
+/// A variant that is composed at run time has the sizes that a build would have given it.
+#[test]
+fn sizes_of_the_default_preset_hold_at_run_time() {
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("sizes");
+    std::fs::create_dir_all(&folder).unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    write(
+        "keys.ron",
+        r#"[(name: "TILE", type: "size", kind: "quality", domain: (1, 256), default: 8, unit: "1", meaning: "Tile.")]"#,
+    );
+    write(
+        "sized.sp",
+        "#PROGRAM{ sized }#\n#COMPUTE{ #CODE{\n@group(0) @binding(0) var<storage, read_write> values: array<u32>;\n@compute @workgroup_size(#{TILE})\nfn run(@builtin(global_invocation_id) id: vec3<u32>) { values[id.x] = id.x; }\n}# }#\n",
+    );
+    let source = Source::read(&[&folder]).unwrap();
+    let width = |p: &veduta::program::ComposedProgram| p.stages[0].entry_points[0].workgroup_size;
+    assert_eq!(width(&source.compose("sized", &[]).unwrap()), [8, 1, 1]);
+    let sized = source.compose_sized("sized", &[], &[("TILE", 32), ("OTHER", 3)]);
+    assert_eq!(width(&sized.unwrap()), [32, 1, 1]);
+    let mut set = veduta::ProgramSet {
+        keys: vec![veduta::program::Key {
+            name: "TILE".into(),
+            kind: KeyKind::Quality,
+            ty: "size".into(),
+            domain: Some((1.0, 256.0)),
+            default: Value::Int(8),
+            unit: "1".into(),
+            meaning: "Tile.".into(),
+        }]
+        .into(),
+        presets: vec![veduta::program::PresetTable {
+            name: "wide".into(),
+            values: vec![("TILE".into(), Value::Int(16))].into(),
+        }]
+        .into(),
+        default_preset: "wide".into(),
+        ..Default::default()
+    };
+    let composed = set.get_or_compose(&source, "sized", &[]).unwrap();
+    assert_eq!(width(composed), [16, 1, 1]);
+}
+
+#[test]
+fn row_l39_the_preset_of_low_quality_leaves_clouds_out_and_is_twice_as_fast() {
     let low = programs()
         .get(
             "landscape",
@@ -640,7 +770,14 @@ fn bad_input_gets_a_typed_error() {
         matches!(not_built, Error::VariantNotBuilt { .. }),
         "{not_built}"
     );
-    fault(not_built, &["COUNT_OPERATIONS", "nearest"]);
+    fault(
+        not_built,
+        &[
+            "COUNT_OPERATIONS",
+            "nearest",
+            "`ProgramSet::get_or_compose`",
+        ],
+    );
     assert!(matches!(
         programs().get("ocean", &[]).unwrap_err(),
         Error::UnknownProgram { .. }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use veduta::eval::{Column, Evaluator, Spec};
 
-use crate::catalog::{Catalog, SourceArgs};
+use crate::catalog::{Catalog, SourceArgs, shown};
 use crate::error::CliError;
 use crate::image::check_folder;
 use crate::table::{Format, Table, write_results};
@@ -49,6 +49,7 @@ pub fn run(args: &EvalArgs) -> Result<(), CliError> {
         Some(path) => std::fs::read_to_string(path).map_err(|e| CliError::read(path, e))?,
         None => String::new(),
     };
+    let prelude_file = args.prelude.as_deref().map(shown).unwrap_or_default();
     let library = Catalog::load(&args.sources)?.library()?;
     let imports: Vec<&str> = args.imports.iter().map(String::as_str).collect();
     let evaluator = Evaluator::new(
@@ -57,6 +58,7 @@ pub fn run(args: &EvalArgs) -> Result<(), CliError> {
         &Spec {
             imports: &imports,
             prelude: &prelude,
+            prelude_file: &prelude_file,
             expression: &args.expression,
             columns: columns.len(),
         },

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
-use veduta_compose::keys::{KeyType, Keys};
+use veduta_compose::keys::{KeyType, Keys, Value};
 use veduta_compose::settings::{Presets, Scene, View, resolve};
 use veduta_compose::{Diag, Diags, Library};
 
@@ -276,16 +276,26 @@ fn check_texts(
             .filter(|k| k.ty == KeyType::Flag && program.relevant.contains(&k.name))
             .map(|k| k.name.as_str())
             .collect();
-        for features in variants(name, &flags, &keys, &presets, &scenes) {
+        let sizes = sizes(name, &program.relevant, &keys, &presets, &scenes);
+        let variants = variants(name, &flags, &keys, &presets, &scenes);
+        for (features, sizes) in variants
+            .iter()
+            .flat_map(|features| sizes.iter().map(move |sizes| (features, sizes)))
+        {
             report.variants += 1;
-            let composed = composer.compose_prepared(&program, &features, &BTreeMap::new());
+            let composed = composer.compose_prepared(&program, features, sizes);
             if let Err(found) = composed {
-                for fault in found.0 {
+                for mut fault in found.0 {
                     let known = faults.iter().any(|f| {
                         (&f.file, f.line, f.column, &f.message)
                             == (&fault.file, fault.line, fault.column, &fault.message)
                     });
                     if !known {
+                        if !sizes.is_empty() {
+                            let with: Vec<String> =
+                                sizes.iter().map(|(n, v)| format!("{n} = {v}")).collect();
+                            fault = fault.note(format!("with {}", with.join(", ")));
+                        }
                         faults.push(fault);
                     }
                 }
@@ -305,6 +315,48 @@ fn clashes(what: &str, texts: &[crate::catalog::NamedText], faults: &mut Diags) 
             );
         }
     }
+}
+
+/// The sizes to compose with: those that are declared, and those of every preset with every scene of the program; only
+/// sizes that make a difference, each set of values once.
+fn sizes(
+    program: &str,
+    relevant: &BTreeSet<String>,
+    keys: &Keys,
+    presets: &Presets,
+    scenes: &[Scene],
+) -> BTreeSet<BTreeMap<String, i64>> {
+    let declared = keys
+        .iter()
+        .filter(|k| k.ty == KeyType::Size && relevant.contains(&k.name))
+        .filter_map(|k| match k.default {
+            Value::Int(value) => Some((k.name.clone(), value)),
+            _ => None,
+        })
+        .collect();
+    let mut maps = BTreeSet::from([declared]);
+    for preset in presets.names() {
+        for scene in drawn(program, scenes) {
+            // The preset exists and nothing else is set: this cannot fail.
+            let Ok(settings) = resolve(keys, presets, preset, scene, &[]) else {
+                continue;
+            };
+            let mut sizes = settings.sizes();
+            sizes.retain(|name, _| relevant.contains(name));
+            maps.insert(sizes);
+        }
+    }
+    maps
+}
+
+/// The scenes that name the program; without any, the program without a scene.
+fn drawn<'a>(program: &str, scenes: &'a [Scene]) -> Vec<Option<&'a Scene>> {
+    let drawn: Vec<_> = scenes
+        .iter()
+        .filter(|s| s.program == program)
+        .map(Some)
+        .collect();
+    if drawn.is_empty() { vec![None] } else { drawn }
 }
 
 /// The sets of features to compose: all combinations of a few flags; of many those of presets and scenes, and the first of
@@ -330,16 +382,10 @@ fn variants(
         }
         return sets;
     }
-    let drawn: Vec<Option<&Scene>> = scenes
-        .iter()
-        .filter(|s| s.program == program)
-        .map(Some)
-        .collect();
-    let drawn = if drawn.is_empty() { vec![None] } else { drawn };
     for preset in presets.names() {
-        for scene in &drawn {
+        for scene in drawn(program, scenes) {
             // The preset exists and nothing else is set: this cannot fail.
-            let Ok(settings) = resolve(keys, presets, preset, *scene, &[]) else {
+            let Ok(settings) = resolve(keys, presets, preset, scene, &[]) else {
                 continue;
             };
             let mut features = settings.flags();

@@ -188,8 +188,12 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         }
     }
     let frames = args.frames.unwrap_or(1);
-    if frames == 0 {
-        return Err(CliError::argument("--frames", "0", "at least 1"));
+    if !(1..=MOST_FRAMES).contains(&frames) {
+        return Err(CliError::argument(
+            "--frames",
+            frames.to_string(),
+            format!("at least 1 and at most {MOST_FRAMES}"),
+        ));
     }
     if !(args.fps > 0.0 && args.fps.is_finite()) {
         return Err(CliError::argument(
@@ -203,11 +207,9 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let gpu = veduta::device::shared()?;
     size.check(&gpu.device)?;
     // Every moment is checked before the first long draw.
-    let times: Vec<f64> = (0..frames)
-        .map(|i| args.time + f64::from(i) / args.fps)
-        .collect();
-    for time in [times.first(), times.last()].into_iter().flatten() {
-        job.view(*time, size)?;
+    let time_of = |frame: u32| args.time + f64::from(frame) / args.fps;
+    for frame in [0, frames - 1] {
+        job.view(time_of(frame), size)?;
     }
     let bar = progress(&job, frames, args);
     let mut stats = None;
@@ -225,13 +227,16 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         let mut renderer = Renderer::new(gpu, job.catalog.set(), &job.options, size, output)?;
         let first = renderer.warm_up(&job.view(args.time, size)?)?;
         let mut costs = Vec::new();
-        for (i, time) in (0..).zip(&times) {
+        for i in 0..frames {
             renderer.set_frame(i);
-            let view = job.view(*time, size)?;
+            let time = time_of(i);
+            let view = job.view(time, size)?;
             let cost = renderer.draw(&view, Tiling::Adaptive, &mut |share| {
                 bar.set_position((1000.0 * (f64::from(i) + share)) as u64);
             })?;
-            costs.push((*time, cost));
+            if args.stats.is_some() {
+                costs.push((time, cost));
+            }
             if let Some(path) = path {
                 let path = match args.frames {
                     Some(_) => numbered(path, i),
@@ -261,6 +266,9 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     bar.finish_and_clear();
     Ok(())
 }
+
+/// Four days of film at 25 frames a second; the costs of so many fit into the memory.
+const MOST_FRAMES: u32 = 10_000_000;
 
 /// The size of a picture when none is given.
 const DEFAULT_SIZE: Size = Size {

@@ -85,6 +85,39 @@ fn variants_are_composed() {
 }
 
 #[test]
+fn the_sizes_of_presets_are_composed() {
+    let dir = folder("lint_sizes");
+    for (file, text) in [
+        (
+            "keys.ron",
+            r#"[(name: "TILE", type: "size", kind: "quality", domain: (1, 256), default: 8, unit: "1", meaning: "Tile."),
+                (name: "WIDE", type: "flag", kind: "quality", default: false, unit: "1", meaning: "Wide.")]"#,
+        ),
+        (
+            "broken.sp",
+            "#PROGRAM{ broken }#\n#COMPUTE{ #CODE{\n@group(0) @binding(0) var<storage, read_write> values: array<u32>;\n@compute @workgroup_size(#{TILE})\nfn run(@builtin(global_invocation_id) id: vec3<u32>) {\n#ifdef WIDE\n    values[id.x] = 2u;\n#endif\n#if TILE == 16\n    values[id.x] = nought;\n#endif\n#if TILE == 4\n    values[id.x] = never;\n#endif\n    values[0] = 1u;\n}\n}# }#\n",
+        ),
+        ("small.ron", r#"(reason: "x", values: {"TILE": 8})"#),
+        ("large.ron", r#"(reason: "x", values: {"TILE": 16})"#),
+        (
+            "larger.ron",
+            r#"(reason: "x", values: {"TILE": 16, "WIDE": true})"#,
+        ),
+    ] {
+        std::fs::write(dir.join(file), text).unwrap();
+    }
+    let run = veduta(&dir, &["lint", "--no-shipped", "."]).bad(1, &["1 fault found"]);
+    for part in ["broken.sp:10:20: ", "nought", "with TILE = 16"] {
+        assert!(run.out.contains(part), "no {part} in {}", run.out);
+    }
+    std::fs::remove_file(dir.join("large.ron")).unwrap();
+    std::fs::remove_file(dir.join("larger.ron")).unwrap();
+    let run = veduta(&dir, &["lint", "--no-shipped", "."]).good();
+    // Two sets of features with the one size.
+    assert!(run.err.contains("and 2 variants"), "{}", run.err);
+}
+
+#[test]
 fn what_ships_has_no_fault() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let run = veduta(

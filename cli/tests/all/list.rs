@@ -51,6 +51,15 @@ fn json_has_one_list_a_subject() {
             );
         }
     }
+    let landscape = &all["programs"][0];
+    assert_eq!(landscape["name"], "landscape");
+    assert!(landscape["variants"].as_array().unwrap().len() > 1);
+}
+
+#[test]
+fn the_default_preset_is_marked() {
+    let dir = folder("list_default");
+    let all = veduta(&dir, &["list", "presets", "--json"]).good().json();
     let defaults: Vec<&str> = all["presets"]
         .as_array()
         .unwrap()
@@ -64,9 +73,6 @@ fn json_has_one_list_a_subject() {
         "thesis"
     };
     assert_eq!(defaults, [wanted]);
-    let landscape = &all["programs"][0];
-    assert_eq!(landscape["name"], "landscape");
-    assert!(landscape["variants"].as_array().unwrap().len() > 1);
 }
 
 #[test]

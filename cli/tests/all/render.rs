@@ -312,6 +312,40 @@ fn the_flight_goes_on_for_ever() {
 }
 
 #[test]
+fn row_l37_the_flight_follows_the_ground_at_its_speed() {
+    for (height, speed, sets) in [
+        (300.0, 50.0, &[][..]),
+        (120.0, 50.0, &["CAM_HEIGHT=120"][..]),
+        (300.0, -7.5, &["CAM_SPEED=-7.5"][..]),
+        (45.5, 900.0, &["CAM_HEIGHT=45.5", "CAM_SPEED=900"][..]),
+    ] {
+        let mut flight = args("thesis", "thesis", None);
+        flight.sets = sets.iter().map(|s| (*s).to_owned()).collect();
+        let job = Job::new(&flight).unwrap();
+        let start = job.view(0.0, SMALL).unwrap().eye.to_metres();
+        let mut grounds = Vec::new();
+        for time in [0.0, 1.0, 60.0, 1e6] {
+            let view = job.view(time, SMALL).unwrap();
+            assert_eq!(view.time, time);
+            let ground = ground_height(job.catalog.set(), &job.settings, view.eye).unwrap();
+            let above = view.eye.altitude() - ground;
+            assert!(
+                (above - height).abs() < 1e-3,
+                "{sets:?} at {time} s: {above} m above the ground"
+            );
+            let eye = view.eye.to_metres();
+            assert!(
+                (start.z - eye.z - speed * time).abs() < 1e-3 && (eye.x - start.x).abs() < 1e-3,
+                "{sets:?} at {time} s: {eye} from {start}"
+            );
+            grounds.push(ground);
+        }
+        // It is not flat, so that following it means something.
+        assert!((grounds[2] - grounds[0]).abs() > 1.0 && (grounds[3] - grounds[0]).abs() > 1.0);
+    }
+}
+
+#[test]
 fn the_ground_is_where_the_device_draws_it() {
     let catalog = Catalog::load(&SourceArgs::default()).unwrap();
     let job = Job::new(&args("thesis", "thesis", None)).unwrap();
@@ -321,6 +355,7 @@ fn the_ground_is_where_the_device_draws_it() {
         &Spec {
             imports: &["veduta::terrain::height::{height, Terrain}"],
             prelude: "",
+            prelude_file: "",
             expression: "height(Terrain(vec2<i32>(in.i[0], in.i[1]), vec2<f32>(in.f[2], in.f[3]), 8192.0, 1400.0, 1.0, 2.0, 0.0, 1u), vec2<f32>(0.0), 10)",
             columns: 4,
         },
@@ -494,6 +529,12 @@ fn bad_options_are_told() {
     run(&["--camera", "0,1e9,0", "--out", "a.png"]).bad(1, &["altitude", "1000000000"]);
     run(&["--camera", "NaN,0,0", "--out", "a.png"]).bad(1, &["x of the eye", "NaN"]);
     run(&["--frames", "0", "--out", "a.png"]).bad(1, &["--frames", "at least 1"]);
+    for frames in ["10000001", "4294967295"] {
+        run(&["--frames", frames, "--out", "a.png"])
+            .bad(1, &["--frames", frames, "at most 10000000"]);
+    }
+    // The last of many moments is checked before the first is drawn.
+    run(&["--frames", "10000000", "--fps", "1e-7", "--out", "a.png"]).bad(1, &["of the eye"]);
     run(&["--frames", "2", "--fps", "0", "--out", "a.png"]).bad(1, &["--fps", "more than 0"]);
     std::fs::write(
         dir.join("bad.ron"),

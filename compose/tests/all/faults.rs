@@ -89,7 +89,7 @@ fn faults(files: &[(&str, &str)], features: &[&str]) -> String {
 
 /// Runs the cases of a golden file (`== name`, the text, `-- says`, what the user reads). With `VEDUTA_BLESS=1` the
 /// findings are written into the file instead; look at the difference before you commit it.
-fn check(file: &str, run: impl Fn(&str) -> String) {
+fn check(file: &str, least: usize, run: impl Fn(&str) -> String) {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("tests/fixtures/faults")
         .join(file);
@@ -112,7 +112,7 @@ fn check(file: &str, run: impl Fn(&str) -> String) {
             ));
         }
     }
-    assert!(count > 10, "{file} has {count} cases");
+    assert!(count >= least, "{file} has {count} cases");
     if std::env::var_os("VEDUTA_BLESS").is_some() {
         std::fs::write(path, blessed).unwrap();
     } else {
@@ -122,14 +122,14 @@ fn check(file: &str, run: impl Fn(&str) -> String) {
 
 #[test]
 fn faults_of_modules() {
-    check("modules.txt", |text| {
+    check("modules.txt", 11, |text| {
         faults(&[("m.wgsl", &module(text)), ("used.wgsl", USED)], &[])
     });
 }
 
 #[test]
 fn faults_of_programs() {
-    check("programs.txt", |text| {
+    check("programs.txt", 11, |text| {
         faults(
             &[
                 ("p.sp", &program(text)),
@@ -143,12 +143,53 @@ fn faults_of_programs() {
 
 #[test]
 fn faults_of_stages() {
-    check("stages.txt", |text| {
+    check("stages.txt", 11, |text| {
         let piece = "const PIECE: f32 = 1.0;\nfn piece() -> f32 { return PIECE + missing; }\n";
         faults(
             &[("p.sp", text), ("used.wgsl", USED), ("piece.wgsl", piece)],
             &[],
         )
+    });
+}
+
+/// What is wrong with presets and scenes only when a whole project is built. Each `@ FILE` line begins a file of it.
+#[test]
+fn faults_of_builds() {
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("fault_builds");
+    check("builds.txt", 4, |text| {
+        let _ = std::fs::remove_dir_all(&folder);
+        let write = |name: &str, text: &str| {
+            let path = folder.join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        };
+        write("presets/keys.ron", KEYS);
+        std::fs::create_dir_all(folder.join("presets/scenes")).unwrap();
+        let mut variant = None;
+        for file in format!("\n{text}\n").split("\n@ ").skip(1) {
+            let (name, text) = file.split_once('\n').unwrap_or((file, ""));
+            match name.strip_prefix("variant ") {
+                Some(features) => variant = Some(features.to_owned()),
+                None => write(name, text),
+            }
+        }
+        let mut build =
+            veduta_compose::Build::of_veduta(folder.join("wgsl"), folder.join("presets"));
+        if let Some(features) = &variant {
+            let features: Vec<&str> = features.split_whitespace().collect();
+            build = build.variant("p", features);
+        }
+        let prefix = format!("{}/", folder.display()).replace('\\', "/");
+        match build.run() {
+            Ok(output) => {
+                let texts = output.programs.iter().map(|p| {
+                    let size = p.stages[0].entry_points[0].workgroup_size;
+                    format!("{:?} {size:?}", p.features)
+                });
+                format!("no fault\n{}", texts.collect::<Vec<_>>().join("\n"))
+            }
+            Err(diags) => diags.to_string().replace(&prefix, ""),
+        }
     });
 }
 
