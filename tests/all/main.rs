@@ -18,3 +18,4 @@ mod sweep;
 mod terrain;
 mod tone_map;
 mod validators;
+mod worley;
