@@ -2,6 +2,7 @@
 //!
 //! Written as the definition says: a sum over the 2^n corners of a cell, each weighted by a product of fades.
 
+pub mod simplex;
 pub mod worley;
 
 use super::hash::{lattice_hash_2d, lattice_word_3d, unit_float};
