@@ -20,4 +20,5 @@ mod sweep;
 mod terrain;
 mod tone_map;
 mod validators;
+mod warp;
 mod worley;
