@@ -2,6 +2,8 @@
 //!
 //! Octave i has frequency 2^i and amplitude 2^(-i H) throughout. Fewer than one octave gives 0.
 
+pub mod warp;
+
 use super::noise::{
     Lattice2d, Lattice3d, gradient_noise_2d_slope, gradient_noise_3d_slope, octave_2d, octave_3d,
     octave_frequency, octave_seed, split_3d, value_noise_3d, value_noise_3d_periodic, wrap_3d,

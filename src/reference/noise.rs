@@ -2,6 +2,9 @@
 //!
 //! Written as the definition says: a sum over the 2^n corners of a cell, each weighted by a product of fades.
 
+pub mod simplex;
+pub mod worley;
+
 use super::hash::{lattice_hash_2d, lattice_word_3d, unit_float};
 
 /// A position on a 2D lattice, `cell + frac`.
@@ -88,9 +91,18 @@ pub fn octave_3d(cell: [i32; 3], frac: [f64; 3], i: i32) -> Lattice3d {
     Lattice3d { cell, frac }
 }
 
+fn wrap<const N: usize>(cell: [i32; N], period: [i32; N]) -> [i32; N] {
+    std::array::from_fn(|axis| cell[axis].rem_euclid(period[axis].max(1)))
+}
+
+/// The 2D cell modulo the period, never negative. A period below 1 counts as 1.
+pub fn wrap_2d(cell: [i32; 2], period: [i32; 2]) -> [i32; 2] {
+    wrap(cell, period)
+}
+
 /// The cell modulo the period, never negative. A period below 1 counts as 1.
 pub fn wrap_3d(cell: [i32; 3], period: [i32; 3]) -> [i32; 3] {
-    std::array::from_fn(|axis| cell[axis].rem_euclid(period[axis].max(1)))
+    wrap(cell, period)
 }
 
 /// The quintic fade 6 t^5 - 15 t^4 + 10 t^3.
@@ -149,14 +161,24 @@ fn neighbour<const N: usize>(cell: [i32; N], offset: [i32; N]) -> [i32; N] {
     std::array::from_fn(|axis| cell[axis].wrapping_add(offset[axis]))
 }
 
-/// Value noise in 2D and its gradient: value, d/dx, d/dy.
-pub fn value_noise_2d_slope(cell: [i32; 2], frac: [f64; 2], seed: u32) -> [f64; 3] {
+/// Value noise in 2D and its gradient, with the cells of the corners passed through `home`.
+fn value_2d(
+    cell: [i32; 2],
+    frac: [f64; 2],
+    seed: u32,
+    home: impl Fn([i32; 2]) -> [i32; 2],
+) -> [f64; 3] {
     let p = split_2d(cell, frac);
     let (value, [dx, dy]) = blend(p.frac, |offset| {
-        let word = lattice_hash_2d(neighbour(p.cell, offset), seed)[0];
+        let word = lattice_hash_2d(home(neighbour(p.cell, offset)), seed)[0];
         (unit_float(word), [0.0; 2])
     });
     [value, dx, dy]
+}
+
+/// Value noise in 2D and its gradient: value, d/dx, d/dy.
+pub fn value_noise_2d_slope(cell: [i32; 2], frac: [f64; 2], seed: u32) -> [f64; 3] {
+    value_2d(cell, frac, seed, |corner| corner)
 }
 
 /// The 23 lowest bits of a word as a number in [0, 1).
@@ -164,14 +186,24 @@ fn low_unit(word: u32) -> f64 {
     f64::from(word & 0x7f_ffff) / f64::from(1_u32 << 23)
 }
 
-/// Value noise in 3D and its gradient: value, d/dx, d/dy, d/dz.
-pub fn value_noise_3d_slope(cell: [i32; 3], frac: [f64; 3], seed: u32) -> [f64; 4] {
+/// Value noise in 3D and its gradient, with the cells of the corners passed through `home`.
+fn value_3d(
+    cell: [i32; 3],
+    frac: [f64; 3],
+    seed: u32,
+    home: impl Fn([i32; 3]) -> [i32; 3],
+) -> [f64; 4] {
     let p = split_3d(cell, frac);
     let (value, [dx, dy, dz]) = blend(p.frac, |offset| {
-        let word = lattice_word_3d(neighbour(p.cell, offset), seed);
+        let word = lattice_word_3d(home(neighbour(p.cell, offset)), seed);
         (low_unit(word), [0.0; 3])
     });
     [value, dx, dy, dz]
+}
+
+/// Value noise in 3D and its gradient: value, d/dx, d/dy, d/dz.
+pub fn value_noise_3d_slope(cell: [i32; 3], frac: [f64; 3], seed: u32) -> [f64; 4] {
+    value_3d(cell, frac, seed, |corner| corner)
 }
 
 /// Value noise in 2D.
@@ -184,14 +216,34 @@ pub fn value_noise_3d(cell: [i32; 3], frac: [f64; 3], seed: u32) -> f64 {
     value_noise_3d_slope(cell, frac, seed)[0]
 }
 
+/// Value noise in 2D and its gradient, on a lattice that repeats after `period` cells.
+pub fn value_noise_2d_periodic_slope(
+    cell: [i32; 2],
+    frac: [f64; 2],
+    period: [i32; 2],
+    seed: u32,
+) -> [f64; 3] {
+    value_2d(cell, frac, seed, |corner| wrap_2d(corner, period))
+}
+
+/// Value noise in 3D and its gradient, on a lattice that repeats after `period` cells.
+pub fn value_noise_3d_periodic_slope(
+    cell: [i32; 3],
+    frac: [f64; 3],
+    period: [i32; 3],
+    seed: u32,
+) -> [f64; 4] {
+    value_3d(cell, frac, seed, |corner| wrap_3d(corner, period))
+}
+
+/// Value noise in 2D whose lattice repeats after `period` cells.
+pub fn value_noise_2d_periodic(cell: [i32; 2], frac: [f64; 2], period: [i32; 2], seed: u32) -> f64 {
+    value_noise_2d_periodic_slope(cell, frac, period, seed)[0]
+}
+
 /// Value noise in 3D whose lattice repeats after `period` cells.
 pub fn value_noise_3d_periodic(cell: [i32; 3], frac: [f64; 3], period: [i32; 3], seed: u32) -> f64 {
-    let p = split_3d(cell, frac);
-    let (value, _) = blend(p.frac, |offset| {
-        let word = lattice_word_3d(wrap_3d(neighbour(p.cell, offset), period), seed);
-        (low_unit(word), [0.0; 3])
-    });
-    value
+    value_noise_3d_periodic_slope(cell, frac, period, seed)[0]
 }
 
 /// The gradient at a lattice point in 2D: length sqrt(2), an angle of 23 bits in the first octant, a swap of the
@@ -235,15 +287,25 @@ pub fn lattice_gradient_3d(cell: [i32; 3], seed: u32) -> [f64; 3] {
     }
 }
 
+/// Gradient noise and its gradient, with the vector of a corner at `offset` from `vector`.
+fn gradient_blend<const N: usize>(
+    frac: [f64; N],
+    vector: impl Fn([i32; N]) -> [f64; N],
+) -> (f64, [f64; N]) {
+    blend(frac, |offset| {
+        let g = vector(offset);
+        let product = (0..N)
+            .map(|axis| g[axis] * (frac[axis] - f64::from(offset[axis])))
+            .sum();
+        (product, g)
+    })
+}
+
 /// Gradient noise in 2D and its gradient: value, d/dx, d/dy.
 pub fn gradient_noise_2d_slope(cell: [i32; 2], frac: [f64; 2], seed: u32) -> [f64; 3] {
     let p = split_2d(cell, frac);
-    let (value, [dx, dy]) = blend(p.frac, |offset| {
-        let g = lattice_gradient_2d(neighbour(p.cell, offset), seed);
-        let product = (0..2)
-            .map(|axis| g[axis] * (p.frac[axis] - f64::from(offset[axis])))
-            .sum();
-        (product, g)
+    let (value, [dx, dy]) = gradient_blend(p.frac, |offset| {
+        lattice_gradient_2d(neighbour(p.cell, offset), seed)
     });
     [value, dx, dy]
 }
@@ -251,14 +313,58 @@ pub fn gradient_noise_2d_slope(cell: [i32; 2], frac: [f64; 2], seed: u32) -> [f6
 /// Gradient noise in 3D and its gradient: value, d/dx, d/dy, d/dz.
 pub fn gradient_noise_3d_slope(cell: [i32; 3], frac: [f64; 3], seed: u32) -> [f64; 4] {
     let p = split_3d(cell, frac);
-    let (value, [dx, dy, dz]) = blend(p.frac, |offset| {
-        let g = lattice_gradient_3d(neighbour(p.cell, offset), seed);
-        let product = (0..3)
-            .map(|axis| g[axis] * (p.frac[axis] - f64::from(offset[axis])))
-            .sum();
-        (product, g)
+    let (value, [dx, dy, dz]) = gradient_blend(p.frac, |offset| {
+        lattice_gradient_3d(neighbour(p.cell, offset), seed)
     });
     [value, dx, dy, dz]
+}
+
+/// Gradient noise in 2D and its gradient, on a lattice that repeats after `period` cells.
+pub fn gradient_noise_2d_periodic_slope(
+    cell: [i32; 2],
+    frac: [f64; 2],
+    period: [i32; 2],
+    seed: u32,
+) -> [f64; 3] {
+    let p = split_2d(cell, frac);
+    let (value, [dx, dy]) = gradient_blend(p.frac, |offset| {
+        lattice_gradient_2d(wrap_2d(neighbour(p.cell, offset), period), seed)
+    });
+    [value, dx, dy]
+}
+
+/// Gradient noise in 3D and its gradient, on a lattice that repeats after `period` cells.
+pub fn gradient_noise_3d_periodic_slope(
+    cell: [i32; 3],
+    frac: [f64; 3],
+    period: [i32; 3],
+    seed: u32,
+) -> [f64; 4] {
+    let p = split_3d(cell, frac);
+    let (value, [dx, dy, dz]) = gradient_blend(p.frac, |offset| {
+        lattice_gradient_3d(wrap_3d(neighbour(p.cell, offset), period), seed)
+    });
+    [value, dx, dy, dz]
+}
+
+/// Gradient noise in 2D whose lattice repeats after `period` cells.
+pub fn gradient_noise_2d_periodic(
+    cell: [i32; 2],
+    frac: [f64; 2],
+    period: [i32; 2],
+    seed: u32,
+) -> f64 {
+    gradient_noise_2d_periodic_slope(cell, frac, period, seed)[0]
+}
+
+/// Gradient noise in 3D whose lattice repeats after `period` cells.
+pub fn gradient_noise_3d_periodic(
+    cell: [i32; 3],
+    frac: [f64; 3],
+    period: [i32; 3],
+    seed: u32,
+) -> f64 {
+    gradient_noise_3d_periodic_slope(cell, frac, period, seed)[0]
 }
 
 /// Gradient noise in 2D.

@@ -10,10 +10,12 @@ use veduta::reference::noise::*;
 type Place = ([i32; 3], [f64; 3]);
 
 const ONE_NOISE: f64 = 2e-6;
-const ARGS_2D: &str = "vec2i(in.i[0], in.i[1]), vec2f(in.f[2], in.f[3]), in.u[4]";
-const ARGS_3D: &str = "vec3i(in.i[0], in.i[1], in.i[2]), vec3f(in.f[3], in.f[4], in.f[5]), in.u[6]";
+pub const ARGS_2D: &str = "vec2i(in.i[0], in.i[1]), vec2f(in.f[2], in.f[3]), in.u[4]";
+pub const ARGS_3D: &str =
+    "vec3i(in.i[0], in.i[1], in.i[2]), vec3f(in.f[3], in.f[4], in.f[5]), in.u[6]";
 
-fn fill<const N: usize>(random: &mut Random, row: &mut [u32]) {
+/// Columns: cells, fractions, seed.
+pub fn fill<const N: usize>(random: &mut Random, row: &mut [u32]) {
     for axis in 0..N {
         row[axis] = random_cell(random);
         row[N + axis] = random_frac(random);
@@ -21,7 +23,8 @@ fn fill<const N: usize>(random: &mut Random, row: &mut [u32]) {
     row[2 * N] = random.bits() as u32 >> (random.bits() & 31);
 }
 
-fn truth<const K: usize>(value: [f64; K]) -> Truth {
+/// The twin's components with the bar of one noise.
+pub fn truth<const K: usize>(value: [f64; K]) -> Truth {
     let mut t = Truth {
         bar: [ONE_NOISE; 4],
         ..Default::default()
@@ -226,16 +229,16 @@ fn cells_wrap_exactly() {
             rows.extend([c, p].map(i32::cast_unsigned));
         }
     }
-    let device = evaluator(
-        &["veduta::noise::lattice::wrap_3d"],
-        "",
-        "wrap_3d(vec3i(in.i[0]), vec3i(in.i[1])).y",
-        2,
-    );
-    let found = device.run_bits(&rows).unwrap();
-    for (row, found) in rows.chunks(2).zip(found) {
-        let expected = wrap_3d([row[0].cast_signed(); 3], [row[1].cast_signed(); 3])[0];
-        assert_eq!(found.cast_signed(), expected, "{row:?}");
+    for (name, call) in [
+        ("wrap_3d", "wrap_3d(vec3i(in.i[0]), vec3i(in.i[1])).y"),
+        ("wrap_2d", "wrap_2d(vec2i(in.i[0]), vec2i(in.i[1])).y"),
+    ] {
+        let device = evaluator(&[&format!("veduta::noise::lattice::{name}")], "", call, 2);
+        let found = device.run_bits(&rows).unwrap();
+        for (row, found) in rows.chunks(2).zip(found) {
+            let expected = wrap_3d([row[0].cast_signed(); 3], [row[1].cast_signed(); 3])[0];
+            assert_eq!(found.cast_signed(), expected, "{name} {row:?}");
+        }
     }
 }
 

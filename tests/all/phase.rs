@@ -165,6 +165,123 @@ fn phase_functions_keep_their_promised_error() {
 }
 
 #[test]
+fn droplets_scatter_as_their_twins_and_all_that_they_scatter() {
+    let (device_rows, list) = rows(200_000, 3, |r| {
+        // Towards the light as often as anywhere: there the lobe is sharp.
+        let beside = log_between(r, 1e-7, 2.0);
+        let mu = if r.unit() < 0.5 {
+            1.0 - beside
+        } else {
+            r.between(-1.0, 1.0)
+        };
+        [
+            mu.max(-1.0),
+            r.between(-0.99, 0.99),
+            r.between(0.0, 100.0),
+            log_between(r, 5.0e-6, 5.0e-5),
+            log_between(r, 0.002, 0.03),
+            r.between(0.3, 0.5),
+            r.between(15.0, 40.0),
+            r.unit(),
+        ]
+    });
+    let check = |name: &str, expression: &str, twin: &dyn Fn(&[f64; 8]) -> Vec<f64>| {
+        let truth: Vec<f64> = list.iter().flat_map(twin).collect();
+        let imports: Vec<String> = ["phase_droplets", "DropletPhase", name]
+            .iter()
+            .map(|name| format!("veduta::lighting::phase::{name}"))
+            .collect();
+        let imports: Vec<&str> = imports.iter().map(String::as_str).collect();
+        let imports = if name == "phase_droplets" {
+            &imports[..2]
+        } else {
+            &imports
+        };
+        let prelude = "fn list(p: DropletPhase) -> vec4f { return vec4f(p.sharp_gap, p.broad_gap, p.alpha, p.broad_share); }";
+        let values = evaluator(imports, prelude, expression, 8)
+            .run(&device_rows)
+            .unwrap();
+        assert_promise("lighting/phase", name, &values, &truth);
+    };
+    check(
+        "phase_draine",
+        "phase_draine(in.f[0], in.f[1], in.f[2])",
+        &|r| vec![phase::phase_draine(r[0], r[1], r[2])],
+    );
+    check("droplet_phase", "list(droplet_phase(in.f[3]))", &|r| {
+        let p = phase::droplet_phase(r[3]);
+        vec![p.sharp_gap, p.broad_gap, p.alpha, p.broad_share]
+    });
+    check(
+        "phase_droplets",
+        "phase_droplets(in.f[0], DropletPhase(in.f[4], in.f[5], in.f[6], in.f[7]))",
+        &|r| {
+            let lobes = phase::DropletPhase {
+                sharp_gap: r[4],
+                broad_gap: r[5],
+                alpha: r[6],
+                broad_share: r[7],
+            };
+            vec![phase::phase_droplets(r[0], lobes)]
+        },
+    );
+    check(
+        "phase_henyey_greenstein_draine",
+        "phase_henyey_greenstein_draine(in.f[0], in.f[3])",
+        &|r| vec![phase::phase_henyey_greenstein_draine(r[0], r[3])],
+    );
+
+    // All of it over the sphere, by 1 - mu = 2 u^8, which spreads the sharp lobe out; and its mean cosine.
+    let rule = gauss_legendre(400);
+    let moments = |f: &dyn Fn(f64) -> f64| {
+        let mut sum = [0.0; 2];
+        for &(x, w) in &rule {
+            let u: f64 = 0.5 * (x + 1.0);
+            let mu = 1.0 - 2.0 * u.powi(8);
+            let weight = 2.0 * PI * 0.5 * w * 16.0 * u.powi(7);
+            sum[0] += weight * f(mu);
+            sum[1] += weight * mu * f(mu);
+        }
+        sum
+    };
+    let mut before = 0.0;
+    for diameter in [5e-6, 8e-6, 1.2e-5, 2e-5, 3.5e-5, 5e-5] {
+        let [whole, cosine] = moments(&|mu| phase::phase_henyey_greenstein_draine(mu, diameter));
+        println!("droplets of {diameter} m: integral {whole:.9}, mean cosine {cosine:.5}");
+        assert!((whole - 1.0).abs() < 1e-6, "{diameter}: {whole}");
+        // The larger the droplets, the more of it goes on forward.
+        assert!(cosine > before && (0.8..0.9).contains(&cosine), "{cosine}");
+        before = cosine;
+    }
+    for (g, alpha) in [
+        (0.0, 5.0),
+        (0.6, 25.0),
+        (-0.7, 1.0),
+        (0.9, 0.0),
+        (0.97, 60.0),
+    ] {
+        let [whole, cosine] = moments(&|mu| phase::phase_draine(mu, g, alpha));
+        assert!((whole - 1.0).abs() < 1e-6, "{g} {alpha}: {whole}");
+        // Draine's closed form of the mean cosine.
+        let expected = g * (1.0 + alpha * (3.0 + 2.0 * g * g) / 5.0)
+            / (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0);
+        assert!((cosine - expected).abs() < 1e-6, "{g} {alpha}: {cosine}");
+    }
+    // The two functions between which Draine's lies, and one place computed by hand.
+    for mu in [-1.0, -0.3, 0.5, 1.0] {
+        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
+        near(
+            phase::phase_draine(mu, 0.7, 0.0),
+            phase::phase_henyey_greenstein(mu, 0.7),
+        );
+        near(
+            phase::phase_draine(mu, 0.7, 1.0),
+            phase::phase_cornette_shanks(mu, 0.7),
+        );
+    }
+}
+
+#[test]
 fn medium_and_series_keep_their_promised_error() {
     let (device_rows, list) = rows(100_000, 2, |r| {
         [

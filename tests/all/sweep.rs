@@ -238,6 +238,18 @@ pub fn check(
     )[0]
 }
 
+/// That the headers' errors are at most eight times what was found.
+pub fn assert_tight(functions: &[String], found: &[Summary]) {
+    for (function, s) in functions.iter().zip(found) {
+        let stated = header_error(function);
+        let worst = s.value_error.max(s.slope_error);
+        assert!(
+            stated <= 8.0 * worst,
+            "{function}: header {stated:e}, found {worst:e}"
+        );
+    }
+}
+
 /// A lattice coordinate: near the origin, near 1e8 on either side, or anywhere.
 pub fn random_cell(random: &mut Random) -> u32 {
     let bits = random.bits();

@@ -16,7 +16,7 @@
 #define_import_path veduta::noise::gradient
 
 #import veduta::hash::lattice::{lattice_hash_2d, lattice_word_3d}
-#import veduta::noise::lattice::{Lattice2d, Lattice3d, split_2d, split_3d, fade_2d, fade_3d, fade_slope_2d, fade_slope_3d}
+#import veduta::noise::lattice::{Lattice2d, Lattice3d, split_2d, split_3d, wrap_2d, wrap_3d, next_cell_2d, next_cell_3d, fade_2d, fade_3d, fade_slope_2d, fade_slope_3d}
 
 const SIGN: u32 = 2147483648u;
 // The icosahedron's two coordinates times 1.3847, 1.17789617 and 0.72797987, as bits.
@@ -128,17 +128,15 @@ fn gradient_noise_3d(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
     return gradient_at_3d(split_3d(cell, frac), seed);
 }
 
-/// Gradient noise and its gradient at a normalised 2D position.
+/// Gradient noise and its gradient between two opposite corners of a 2D cell, which need not be neighbours.
 ///
 /// internal
-fn gradient_at_2d_slope(p: Lattice2d, seed: u32) -> vec3<f32> {
-    let c = p.cell;
-    let t = p.frac;
+fn gradient_between_2d_slope(low: vec2<i32>, high: vec2<i32>, t: vec2<f32>, seed: u32) -> vec3<f32> {
     let s = t - 1.0;
-    let g00 = lattice_gradient_2d(c, seed);
-    let g10 = lattice_gradient_2d(vec2<i32>(c.x + 1, c.y), seed);
-    let g01 = lattice_gradient_2d(vec2<i32>(c.x, c.y + 1), seed);
-    let g11 = lattice_gradient_2d(c + 1, seed);
+    let g00 = lattice_gradient_2d(low, seed);
+    let g10 = lattice_gradient_2d(vec2<i32>(high.x, low.y), seed);
+    let g01 = lattice_gradient_2d(vec2<i32>(low.x, high.y), seed);
+    let g11 = lattice_gradient_2d(high, seed);
     let n00 = dot(g00, t);
     let n10 = dot(g10, vec2<f32>(s.x, t.y));
     let n01 = dot(g01, vec2<f32>(t.x, s.y));
@@ -150,6 +148,13 @@ fn gradient_at_2d_slope(p: Lattice2d, seed: u32) -> vec3<f32> {
     let across = vec2<f32>((n10 - n00) * g.y + (n11 - n01) * f.y, n1 - n0);
     let mean = (g00 * g.x + g10 * f.x) * g.y + (g01 * g.x + g11 * f.x) * f.y;
     return vec3<f32>(n0 * g.y + n1 * f.y, mean + fade_slope_2d(t) * across);
+}
+
+/// Gradient noise and its gradient at a normalised 2D position.
+///
+/// internal
+fn gradient_at_2d_slope(p: Lattice2d, seed: u32) -> vec3<f32> {
+    return gradient_between_2d_slope(p.cell, p.cell + 1, p.frac, seed);
 }
 
 /// Gradient noise in 2D and its gradient: (value, d/dx, d/dy), per cell.
@@ -164,21 +169,19 @@ fn gradient_noise_2d_slope(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> vec3<
     return gradient_at_2d_slope(split_2d(cell, frac), seed);
 }
 
-/// Gradient noise and its gradient at a normalised 3D position.
+/// Gradient noise and its gradient between two opposite corners of a 3D cell, which need not be neighbours.
 ///
 /// internal
-fn gradient_at_3d_slope(p: Lattice3d, seed: u32) -> vec4<f32> {
-    let c = p.cell;
-    let t = p.frac;
+fn gradient_between_3d_slope(low: vec3<i32>, high: vec3<i32>, t: vec3<f32>, seed: u32) -> vec4<f32> {
     let s = t - 1.0;
-    let g000 = lattice_gradient_3d(c, seed);
-    let g100 = lattice_gradient_3d(vec3<i32>(c.x + 1, c.y, c.z), seed);
-    let g010 = lattice_gradient_3d(vec3<i32>(c.x, c.y + 1, c.z), seed);
-    let g110 = lattice_gradient_3d(vec3<i32>(c.x + 1, c.y + 1, c.z), seed);
-    let g001 = lattice_gradient_3d(vec3<i32>(c.x, c.y, c.z + 1), seed);
-    let g101 = lattice_gradient_3d(vec3<i32>(c.x + 1, c.y, c.z + 1), seed);
-    let g011 = lattice_gradient_3d(vec3<i32>(c.x, c.y + 1, c.z + 1), seed);
-    let g111 = lattice_gradient_3d(c + 1, seed);
+    let g000 = lattice_gradient_3d(low, seed);
+    let g100 = lattice_gradient_3d(vec3<i32>(high.x, low.y, low.z), seed);
+    let g010 = lattice_gradient_3d(vec3<i32>(low.x, high.y, low.z), seed);
+    let g110 = lattice_gradient_3d(vec3<i32>(high.x, high.y, low.z), seed);
+    let g001 = lattice_gradient_3d(vec3<i32>(low.x, low.y, high.z), seed);
+    let g101 = lattice_gradient_3d(vec3<i32>(high.x, low.y, high.z), seed);
+    let g011 = lattice_gradient_3d(vec3<i32>(low.x, high.y, high.z), seed);
+    let g111 = lattice_gradient_3d(high, seed);
     let n000 = dot(g000, t);
     let n100 = dot(g100, vec3<f32>(s.x, t.y, t.z));
     let n010 = dot(g010, vec3<f32>(t.x, s.y, t.z));
@@ -207,6 +210,13 @@ fn gradient_at_3d_slope(p: Lattice3d, seed: u32) -> vec4<f32> {
     return vec4<f32>(n0 * g.z + n1 * f.z, mean0 * g.z + mean1 * f.z + fade_slope_3d(t) * across);
 }
 
+/// Gradient noise and its gradient at a normalised 3D position.
+///
+/// internal
+fn gradient_at_3d_slope(p: Lattice3d, seed: u32) -> vec4<f32> {
+    return gradient_between_3d_slope(p.cell, p.cell + 1, p.frac, seed);
+}
+
 /// Gradient noise in 3D and its gradient: (value, d/dx, d/dy, d/dz), per cell.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
@@ -217,4 +227,62 @@ fn gradient_at_3d_slope(p: Lattice3d, seed: u32) -> vec4<f32> {
 /// source  Leitner2022 3.7; Quilez2017 Gradient noise derivatives
 fn gradient_noise_3d_slope(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> vec4<f32> {
     return gradient_at_3d_slope(split_3d(cell, frac), seed);
+}
+
+/// Gradient noise in 2D on a lattice that repeats after `period` cells on each axis.
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  frac in [0, 1] cell lin
+/// domain  period in [1, 1073741824] cell lin
+/// domain  seed in [0, 4294967295] 1 lin
+/// range   [-1, 1] 1
+/// error   4e-7 abs of reference::noise::gradient_noise_2d_periodic
+/// source  Leitner2022 3.7; departs: periodic lattice
+fn gradient_noise_2d_periodic(cell: vec2<i32>, frac: vec2<f32>, period: vec2<i32>, seed: u32) -> f32 {
+    return gradient_noise_2d_periodic_slope(cell, frac, period, seed).x;
+}
+
+/// Gradient noise in 2D on a lattice that repeats after `period` cells on each axis, and its gradient: (value, d/dx, d/dy),
+/// per cell.
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  frac in [0, 1] cell lin
+/// domain  period in [1, 1073741824] cell lin
+/// domain  seed in [0, 4294967295] 1 lin
+/// range   [-6, 6] 1
+/// error   1.5e-6 abs of reference::noise::gradient_noise_2d_periodic_slope
+/// source  Leitner2022 3.7; Quilez2017 Gradient noise derivatives; departs: periodic lattice
+fn gradient_noise_2d_periodic_slope(cell: vec2<i32>, frac: vec2<f32>, period: vec2<i32>, seed: u32) -> vec3<f32> {
+    let p = split_2d(cell, frac);
+    let low = wrap_2d(p.cell, period);
+    return gradient_between_2d_slope(low, next_cell_2d(low, period), p.frac, seed);
+}
+
+/// Gradient noise in 3D on a lattice that repeats after `period` cells on each axis.
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  frac in [0, 1] cell lin
+/// domain  period in [1, 1073741824] cell lin
+/// domain  seed in [0, 4294967295] 1 lin
+/// range   [-1, 1] 1
+/// error   5e-7 abs of reference::noise::gradient_noise_3d_periodic
+/// source  Leitner2022 3.7; departs: 24 directions, periodic lattice
+fn gradient_noise_3d_periodic(cell: vec3<i32>, frac: vec3<f32>, period: vec3<i32>, seed: u32) -> f32 {
+    return gradient_noise_3d_periodic_slope(cell, frac, period, seed).x;
+}
+
+/// Gradient noise in 3D on a lattice that repeats after `period` cells on each axis, and its gradient: (value, d/dx, d/dy,
+/// d/dz), per cell.
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  frac in [0, 1] cell lin
+/// domain  period in [1, 1073741824] cell lin
+/// domain  seed in [0, 4294967295] 1 lin
+/// range   [-8, 8] 1
+/// error   1.5e-6 abs of reference::noise::gradient_noise_3d_periodic_slope
+/// source  Leitner2022 3.7; Quilez2017 Gradient noise derivatives; departs: 24 directions, periodic lattice
+fn gradient_noise_3d_periodic_slope(cell: vec3<i32>, frac: vec3<f32>, period: vec3<i32>, seed: u32) -> vec4<f32> {
+    let p = split_3d(cell, frac);
+    let low = wrap_3d(p.cell, period);
+    return gradient_between_3d_slope(low, next_cell_3d(low, period), p.frac, seed);
 }

@@ -207,6 +207,53 @@ fn wrap_3d(cell: vec3<i32>, period: vec3<i32>) -> vec3<i32> {
     return select(low, low - period, low >= period);
 }
 
+/// The 2D cell wrapped into [0, period), also from negative cells; see `wrap_3d`.
+///
+/// domain  cell in [-2147483648, 2147483647] cell lin
+/// domain  period in [1, 1073741824] cell lin
+/// range   [0, 1073741823] cell
+/// error   0 abs of reference::noise::wrap_2d
+/// source  ours
+fn wrap_2d(cell: vec2<i32>, period: vec2<i32>) -> vec2<i32> {
+    return wrap_3d(cell.xyy, period.xyy).xy;
+}
+
+/// The cell next to a wrapped one on each axis, wrapped.
+///
+/// internal
+fn next_cell_2d(cell: vec2<i32>, period: vec2<i32>) -> vec2<i32> {
+    let next = cell + 1;
+    return select(next, vec2<i32>(0), next >= period);
+}
+
+/// The cell next to a wrapped one on each axis in 3D, wrapped.
+///
+/// internal
+fn next_cell_3d(cell: vec3<i32>, period: vec3<i32>) -> vec3<i32> {
+    let next = cell + 1;
+    return select(next, vec3<i32>(0), next >= period);
+}
+
+/// A cell at most two away from a wrapped one, wrapped without a division; a size of 0 leaves it as it is.
+///
+/// internal
+fn wrap_near_2d(cell: vec2<i32>, size: vec2<i32>) -> vec2<i32> {
+    var c = select(cell, cell + size, cell < vec2<i32>(0));
+    c = select(c, c + size, c < vec2<i32>(0));
+    c = select(c, c - size, c >= size);
+    return select(c, c - size, c >= size);
+}
+
+/// A 3D cell at most two away from a wrapped one, wrapped without a division; a size of 0 leaves it as it is.
+///
+/// internal
+fn wrap_near_3d(cell: vec3<i32>, size: vec3<i32>) -> vec3<i32> {
+    var c = select(cell, cell + size, cell < vec3<i32>(0));
+    c = select(c, c + size, c < vec3<i32>(0));
+    c = select(c, c - size, c >= size);
+    return select(c, c - size, c >= size);
+}
+
 /// The quintic fade 6 t^5 - 15 t^4 + 10 t^3, as t + s w (2 + 6 w) with s = t - 1/2 and w = t (1 - t), where
 /// little cancels; 0 and 1 are exact. The floor takes off a rounding below 0.
 ///
