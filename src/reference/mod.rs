@@ -14,5 +14,6 @@ pub mod planet;
 pub mod post;
 pub mod quadrature;
 pub mod sky;
+pub mod sky_paths;
 pub mod terrain;
 pub mod tone_map;
