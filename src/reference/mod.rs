@@ -4,6 +4,7 @@ pub mod atmosphere;
 pub mod clouds;
 pub mod fractal;
 pub mod hash;
+pub mod intersect;
 pub mod math;
 pub mod medium;
 pub mod monte_carlo;
