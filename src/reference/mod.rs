@@ -1,4 +1,8 @@
-//! The f64 twins of the module functions, written from the formulas.
+//! The f64 twins of the module functions, written from the formulas, and the references that they are judged by.
+//!
+//! References, each with an error: [`quadrature`], [`sky`] (scattered once), [`sky_paths`] (all orders), [`volume`] (both,
+//! in any medium), [`intersect`].
+//! What they stand on: [`monte_carlo`], [`parallel`].
 
 pub mod atmosphere;
 pub mod clouds;
@@ -18,3 +22,4 @@ pub mod sky;
 pub mod sky_paths;
 pub mod terrain;
 pub mod tone_map;
+pub mod volume;
