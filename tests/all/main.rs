@@ -14,6 +14,7 @@ mod landscape;
 mod noise;
 mod phase;
 mod planet;
+mod reference;
 mod sweep;
 mod terrain;
 mod tone_map;
