@@ -19,7 +19,7 @@ pub fn parallel_map<T: Send>(count: usize, f: impl Fn(usize) -> T + Sync) -> Vec
     };
     let mut results = std::thread::scope(|scope| {
         let helpers: Vec<_> = (1..threads.min(count.max(1)))
-            .map(|_| scope.spawn(&work))
+            .map(|_| scope.spawn(work))
             .collect();
         let mut all = work();
         for helper in helpers {
