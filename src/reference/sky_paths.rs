@@ -356,6 +356,9 @@ impl Tracer<'_> {
 
 /// Radiance of all orders up to `paths.max_order` along a view ray, light from the ground it ends on included and the sun's
 /// disc excluded. `stream` tells the rays of one seed apart.
+///
+/// The standard error is honest where many samples carry light. It is not for a ray in the planet's shadow that order 1 alone
+/// would light through a sliver of its length: when every sample is 0, so is the error. Use [`Sky::single_scatter`] there.
 pub fn trace_sky(sky: &Sky, ray: &SkyRay, paths: &Paths, stream: u64) -> Measured {
     let Some(reach) = sky.reach(ray) else {
         let escapes = ray.distance == f64::INFINITY;
