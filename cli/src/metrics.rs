@@ -27,7 +27,7 @@ pub struct Worst {
 /// What separates a picture from its reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Difference {
-    /// Of the 8-bit pictures [dB]; infinite for equal ones.
+    /// Of the 8-bit pictures, in dB; infinite for equal ones.
     pub psnr: f64,
     /// Of the radiance: root of the mean square difference over that of the mean square of the reference.
     pub relative_rmse: f64,
@@ -58,7 +58,10 @@ impl Picture {
     /// # Errors
     /// [`CliError::Argument`] when the sides are no multiples of `samples`.
     pub fn averaged(&self, samples: usize) -> Result<Picture, CliError> {
-        if samples == 0 || self.width % samples != 0 || self.height % samples != 0 {
+        if samples == 0
+            || !self.width.is_multiple_of(samples)
+            || !self.height.is_multiple_of(samples)
+        {
             return Err(CliError::argument(
                 "samples",
                 samples.to_string(),

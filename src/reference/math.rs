@@ -53,6 +53,7 @@ pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
         .map(|i| {
             let mut x = (std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
             let mut slope = 1.0;
+            let mut found = false;
             for _ in 0..100 {
                 let (mut p0, mut p1) = (1.0, x);
                 for k in 2..=n {
@@ -60,11 +61,13 @@ pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
                     (p0, p1) = (p1, ((2.0 * k - 1.0) * x * p1 - (k - 1.0) * p0) / k);
                 }
                 slope = n as f64 * (x * p1 - p0) / (x * x - 1.0);
-                let step = p1 / slope;
-                x -= step;
-                if step.abs() < 1e-15 {
+                // The weight wants the slope at the root itself.
+                if found {
                     break;
                 }
+                let step = p1 / slope;
+                x -= step;
+                found = step.abs() < 1e-15;
             }
             (x, 2.0 / ((1.0 - x * x) * slope * slope))
         })

@@ -1,14 +1,25 @@
-//! The f64 twins of the module functions, written from the formulas.
+//! The f64 twins of the module functions, written from the formulas, and the references that they are judged by.
+//!
+//! References, each with an error: [`quadrature`], [`sky`] (scattered once), [`sky_paths`] (all orders), [`volume`] (both,
+//! in any medium), [`intersect`].
+//! What they stand on: [`monte_carlo`], [`parallel`].
 
 pub mod atmosphere;
 pub mod clouds;
 pub mod fractal;
 pub mod hash;
+pub mod intersect;
 pub mod math;
 pub mod medium;
+pub mod monte_carlo;
 pub mod noise;
+pub mod parallel;
 pub mod phase;
 pub mod planet;
 pub mod post;
+pub mod quadrature;
+pub mod sky;
+pub mod sky_paths;
 pub mod terrain;
 pub mod tone_map;
+pub mod volume;

@@ -28,16 +28,12 @@ pub enum Effect {
     All,
 }
 
+/// Keys with their values.
+type Values = &'static [(&'static str, Value)];
+
 impl Effect {
     /// Scene, flags that leave other effects out, values of the converged textbook picture, rays in a pixel's row.
-    fn plan(
-        self,
-    ) -> (
-        &'static str,
-        &'static [(&'static str, Value)],
-        &'static [(&'static str, Value)],
-        u32,
-    ) {
+    fn plan(self) -> (&'static str, Values, Values, u32) {
         const OFF: Value = Value::Flag(false);
         const CLOUDS: [(&str, Value); 4] = [
             ("CLOUD_STEPS", Value::Int(512)),
