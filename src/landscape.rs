@@ -352,15 +352,14 @@ impl Landscape {
         let (terrain_cell, terrain_frac) = place("TERRAIN_SCALE")?;
         let (rock_cell, rock_frac) = place("ROCK_SCALE")?;
         // Period and wavelength differ by a power of two, so that the cell and the fraction give the turn exactly.
-        let doublings = number("CLOUD_PERIOD_DOUBLINGS") as u32;
+        // The key's domain is [1, 12], so that a cell takes 20 to 31 of a turn's 32 bits.
         let (cloud_cell, cloud_frac) = place("CLOUD_SCALE")?;
+        let bits = 32_u32.wrapping_sub(number("CLOUD_PERIOD_DOUBLINGS") as u32);
+        let cell = f64::from(1_u32.wrapping_shl(bits));
         let cloud_turn = [0, 1, 2].map(|axis| {
-            let cells = 2_f64.powi(32 - doublings.min(32).cast_signed());
-            let within = (f64::from(cloud_frac[axis]) * cells) as u32;
-            (cloud_cell[axis].cast_unsigned())
-                .checked_shl(32 - doublings)
-                .unwrap_or(0)
-                .wrapping_add(within)
+            let within = (f64::from(cloud_frac[axis]) * cell) as u32;
+            let whole = cloud_cell[axis].cast_unsigned().wrapping_shl(bits);
+            whole.wrapping_add(within)
         });
         Ok(Anchors {
             terrain_cell: [terrain_cell[0], terrain_cell[2]],
