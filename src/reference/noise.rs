@@ -110,9 +110,9 @@ pub fn fade(t: f64) -> f64 {
     t * t * t * (t * (6.0 * t - 15.0) + 10.0)
 }
 
-/// The quintic fade of t = s + 1/2.
-pub fn fade_centred(s: f64) -> f64 {
-    fade(s + 0.5)
+/// The quintic fade of a fraction given as an integer of 2^32 a cell.
+pub fn fade_fraction(fraction: u32) -> f64 {
+    fade(f64::from(fraction) / 2_f64.powi(32))
 }
 
 /// The position within a torus in turns of 2^32, at `turns` turns from its start.

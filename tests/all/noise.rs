@@ -301,11 +301,12 @@ fn fades_keep_their_bounds() {
         });
         assert_eq!((s.low, s.high), (0.0, 1.0));
     }
-    let path = "veduta::noise::lattice::fade_centred_3d";
-    check(path, "vec3f(in.f[0] - 0.5)", 1, 1_000_000, fill, |row| {
+    let path = "veduta::noise::lattice::fade_fraction_3d";
+    let fill_word = |random: &mut Random, row: &mut [u32]| row[0] = random.bits() as u32;
+    check(path, "vec3u(in.u[0])", 1, 1_000_000, fill_word, |row| {
         Truth {
-            value: [fade_centred(float(row[0]) - 0.5); 4],
-            bar: [1e-6; 4],
+            value: [fade_fraction(row[0]); 4],
+            bar: [1.8e-7; 4],
             kink: false,
         }
     });

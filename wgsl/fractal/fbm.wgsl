@@ -8,8 +8,9 @@
 //! symbols  octaves number of octaves [1] · hurst Hurst exponent H, 1 smooth, 0 rough [1]
 #define_import_path veduta::fractal::fbm
 
-#import veduta::noise::lattice::{Lattice3d, split_2d, split_3d, wrap_3d, finer_2d, finer_3d, shifted_2d, shifted_3d, octave_seed, octave_frequency, octave_fall, fade_centred_3d}
+#import veduta::noise::lattice::{Lattice3d, split_2d, split_3d, wrap_3d, finer_2d, finer_3d, shifted_2d, shifted_3d, octave_seed, octave_frequency, octave_fall, fade_fraction_3d}
 #import veduta::noise::gradient::{gradient_at_2d, gradient_at_3d, gradient_at_2d_slope, gradient_at_3d_slope}
+#import veduta::hash::lattice::{SPREAD_3D, spread_zero_3d, lattice_keys_3d}
 #import veduta::noise::value::{value_between_3d, value_plus_one_3d}
 
 /// fBm of gradient noise in 2D.
@@ -195,11 +196,11 @@ fn fbm_value_3d_periodic(
 ///
 /// internal
 fn torus_octave_3d(turn: vec3<u32>, bits: u32, seed: u32) -> f32 {
-    let low = turn >> vec3<u32>(32u - bits);
-    let high = (low + 1u) & vec3<u32>((1u << bits) - 1u);
-    // The fraction less 1/2, by way of its 23 upper bits as those of a number in [1, 2).
-    let s = bitcast<vec3<f32>>(((turn << vec3<u32>(bits)) >> vec3<u32>(9u)) | vec3<u32>(0x3f800000u)) - 1.5;
-    return value_plus_one_3d(bitcast<vec3<i32>>(low), bitcast<vec3<i32>>(high), fade_centred_3d(s), seed);
+    let cell = turn >> vec3<u32>(32u - bits);
+    let zero = spread_zero_3d(seed);
+    let low = cell * SPREAD_3D + zero;
+    let high = select(low + SPREAD_3D, zero, cell == vec3<u32>((1u << bits) - 1u));
+    return value_plus_one_3d(lattice_keys_3d(low), lattice_keys_3d(high), fade_fraction_3d(turn << vec3<u32>(bits)));
 }
 
 /// Six octaves of value noise in 3D on a torus, divided by the sum of the amplitudes: the cloud field. It is

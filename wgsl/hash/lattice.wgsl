@@ -13,16 +13,14 @@
 //! symbols  cell lattice point [cell] · seed selects one of 2^32 hashes [1]
 #define_import_path veduta::hash::lattice
 
-#import veduta::hash::pcg::{pcg, pcg_2d_keyed, pcg_3d_keyed}
+#import veduta::hash::pcg::{pcg, pcg_2d_keyed, pcg_2d_corners_keyed, pcg_3d_keyed}
 
 const PRIME_X: u32 = 149u;
 const PRIME_Y: u32 = 233u;
 // The source gives no third prime; this one continues the ratio of the first two.
 const PRIME_Z: u32 = 367u;
 // Odd multipliers of the axes of `lattice_word_3d`, and of its seed.
-const WORD_X: u32 = 747796405u;
-const WORD_Y: u32 = 2654435769u;
-const WORD_Z: u32 = 2246822519u;
+const SPREAD_3D: vec3<u32> = vec3<u32>(747796405u, 2654435769u, 2246822519u);
 const WORD_SEED: u32 = 2654435761u;
 const WORD_START: u32 = 1013904223u;
 const SOURCE_SHIFT: f32 = 3250000.0;
@@ -38,6 +36,14 @@ fn lattice_hash_2d(cell: vec2<i32>, seed: u32) -> vec2<u32> {
     return pcg_2d_keyed(bitcast<vec2<u32>>(cell), seed);
 }
 
+/// The first words of `lattice_hash_2d` at the corners of a cell, which need not be neighbours; in the order of (x, y):
+/// both low, x high, y high, both high. What corners share is done once, and the rest side by side.
+///
+/// internal
+fn lattice_words_2d(low: vec2<i32>, high: vec2<i32>, seed: u32) -> vec4<u32> {
+    return pcg_2d_corners_keyed(bitcast<vec2<u32>>(low), bitcast<vec2<u32>>(high), seed);
+}
+
 /// Three random words of a lattice point; for every seed a bijection of the point.
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
@@ -49,11 +55,43 @@ fn lattice_hash_3d(cell: vec3<i32>, seed: u32) -> vec3<u32> {
     return pcg_3d_keyed(bitcast<vec3<u32>>(cell), seed);
 }
 
-/// A word whose upper half is folded into the lower one: a bijection.
+/// The coordinates of a lattice point, spread over all bits: what its neighbours' differ by is a constant, so that a whole
+/// cell takes three multiplications.
 ///
 /// internal
-fn fold(word: u32) -> u32 {
-    return word ^ (word >> 16u);
+fn spread_3d(cell: vec3<i32>, seed: u32) -> vec3<u32> {
+    return bitcast<vec3<u32>>(cell) * SPREAD_3D + spread_zero_3d(seed);
+}
+
+/// The spread coordinates of the lattice point 0. The increments keep it from being a fixed point, and the mirror of a
+/// product's bits far from the origin.
+///
+/// internal
+fn spread_zero_3d(seed: u32) -> vec3<u32> {
+    return vec3<u32>(WORD_START, WORD_START, seed * WORD_SEED + WORD_START);
+}
+
+/// The keys of spread coordinates, which all points share that have the coordinate: the upper half is folded into the lower
+/// one, a bijection, and x is multiplied once more.
+///
+/// internal
+fn lattice_keys_3d(spread: vec3<u32>) -> vec3<u32> {
+    let folded = spread ^ (spread >> vec3<u32>(16u));
+    return vec3<u32>(folded.x * SPREAD_3D.x, folded.y, folded.z);
+}
+
+/// The keys of a cell's four rows along x, in the order of (y, z): both low, y high, z high, both high.
+///
+/// internal
+fn rows_of_keys_3d(low: vec3<u32>, high: vec3<u32>) -> vec4<u32> {
+    return vec4<u32>(low.y, high.y, low.y, high.y) + vec4<u32>(low.z, low.z, high.z, high.z);
+}
+
+/// The words of four points with the same x on four rows.
+///
+/// internal
+fn words_of_rows_3d(x: u32, rows: vec4<u32>) -> vec4<u32> {
+    return (vec4<u32>(x) ^ rows) * (rows | vec4<u32>(1u));
 }
 
 /// One random word of a lattice point, cheaply: its 23 lowest bits make good numbers, of which the upper ones are the best.
@@ -70,10 +108,9 @@ fn fold(word: u32) -> u32 {
 /// error   0 abs of reference::hash::lattice_word_3d
 /// source  ours
 fn lattice_word_3d(cell: vec3<i32>, seed: u32) -> u32 {
-    let p = bitcast<vec3<u32>>(cell);
-    // The increments keep 0 from being a fixed point, and the mirror of a product's bits far from the origin.
-    let row = fold(p.y * WORD_Y + WORD_START) + fold(p.z * WORD_Z + (seed * WORD_SEED + WORD_START));
-    return ((fold(p.x * WORD_X + WORD_START) * WORD_X) ^ row) * (row | 1u);
+    let keys = lattice_keys_3d(spread_3d(cell, seed));
+    let row = keys.y + keys.z;
+    return (keys.x ^ row) * (row | 1u);
 }
 
 /// The source's chosen scheme in 2D: one PCG hash of the XOR of prime multiples.

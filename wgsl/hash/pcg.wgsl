@@ -65,6 +65,18 @@ fn pcg_2d_keyed(v: vec2<u32>, key: u32) -> vec2<u32> {
     return w;
 }
 
+/// The first words of `pcg_2d_keyed` of (low, low), (high, low), (low, high) and (high, high).
+///
+/// internal
+fn pcg_2d_corners_keyed(low: vec2<u32>, high: vec2<u32>, key: u32) -> vec4<u32> {
+    let w = vec4<u32>(low, high) * MULTIPLIER + INCREMENT;
+    let y = w.yw;
+    let row = (((y ^ (y >> vec2<u32>(16u))) * MULTIPLIER) ^ vec2<u32>(key * KEY_SPREAD)).xxyy;
+    let sum = w.xzxz + row;
+    let product = (sum ^ (sum >> vec4<u32>(15u))) * (row | vec4<u32>(1u));
+    return product ^ (product >> vec4<u32>(15u));
+}
+
 /// Mixing hash of two words: a bijection of the vector.
 ///
 /// domain  v in [0, 4294967295] 1 lin

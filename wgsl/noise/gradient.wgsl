@@ -15,7 +15,7 @@
 //! symbols  cell lattice point [cell] · frac position within the cell [cell] · seed selects one of 2^32 noises [1]
 #define_import_path veduta::noise::gradient
 
-#import veduta::hash::lattice::{lattice_hash_2d, lattice_word_3d}
+#import veduta::hash::lattice::{lattice_hash_2d, lattice_words_2d, lattice_word_3d, SPREAD_3D, spread_3d, lattice_keys_3d, rows_of_keys_3d, words_of_rows_3d}
 #import veduta::noise::lattice::{Lattice2d, Lattice3d, split_2d, split_3d, wrap_2d, wrap_3d, next_cell_2d, next_cell_3d, fade_2d, fade_3d, fade_slope_2d, fade_slope_3d}
 
 const SIGN: u32 = 2147483648u;
@@ -23,10 +23,31 @@ const SIGN: u32 = 2147483648u;
 const LONG_SIDE: u32 = 0x3f96c54du;
 const SHORT_SIDE: u32 = 0x3f3a5ce4u;
 
-/// The vector at a lattice point in 2D: a random direction, length sqrt(2).
+/// Four vectors in 2D.
+struct Vectors2d {
+    x: vec4<f32>,
+    y: vec4<f32>,
+}
+
+/// Random directions from words, length sqrt(2).
 ///
 /// sqrt(2) sin(pi/4 u) over an octant is u plus a minimax polynomial, so that there is one rounding of its size; the
 /// cosine follows from the length.
+///
+/// internal
+fn directions_2d(words: vec4<u32>) -> Vectors2d {
+    let u = bitcast<vec4<f32>>((words >> vec4<u32>(9u)) | vec4<u32>(0x3f800000u)) - 1.0;
+    let q = u * u;
+    let short = u + u * (q * (q * (q * -5.0847045569e-5 + 0.00352140138907) - 0.114191288864) + 0.110720731116);
+    let long = sqrt(2.0 - short * short);
+    let swap = (words & vec4<u32>(4u)) != vec4<u32>(0u);
+    return Vectors2d(
+        bitcast<vec4<f32>>(bitcast<vec4<u32>>(select(long, short, swap)) ^ (words << vec4<u32>(31u))),
+        bitcast<vec4<f32>>(bitcast<vec4<u32>>(select(short, long, swap)) ^ ((words << vec4<u32>(30u)) & vec4<u32>(SIGN))),
+    );
+}
+
+/// The vector at a lattice point in 2D: a random direction, length sqrt(2).
 ///
 /// domain  cell in [-2147483648, 2147483647] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
@@ -34,16 +55,8 @@ const SHORT_SIDE: u32 = 0x3f3a5ce4u;
 /// error   1.5e-7 abs of reference::noise::lattice_gradient_2d
 /// source  Leitner2022 3.7
 fn lattice_gradient_2d(cell: vec2<i32>, seed: u32) -> vec2<f32> {
-    let h = lattice_hash_2d(cell, seed).x;
-    let u = bitcast<f32>((h >> 9u) | 0x3f800000u) - 1.0;
-    let q = u * u;
-    let short = u + u * (q * (q * (q * -5.0847045569e-5 + 0.00352140138907) - 0.114191288864) + 0.110720731116);
-    let long = sqrt(2.0 - short * short);
-    let swap = (h & 4u) != 0u;
-    return vec2<f32>(
-        bitcast<f32>(bitcast<u32>(select(long, short, swap)) ^ (h << 31u)),
-        bitcast<f32>(bitcast<u32>(select(short, long, swap)) ^ ((h << 30u) & SIGN)),
-    );
+    let v = directions_2d(vec4<u32>(lattice_hash_2d(cell, seed).x));
+    return vec2<f32>(v.x.x, v.y.x);
 }
 
 /// The vector at a lattice point in 3D: one of 24 directions, length 1.3847.
@@ -70,16 +83,14 @@ fn lattice_gradient_3d(cell: vec3<i32>, seed: u32) -> vec3<f32> {
 ///
 /// internal
 fn gradient_at_2d(p: Lattice2d, seed: u32) -> f32 {
-    let c = p.cell;
     let t = p.frac;
     let s = t - 1.0;
-    let n00 = dot(lattice_gradient_2d(c, seed), t);
-    let n10 = dot(lattice_gradient_2d(vec2<i32>(c.x + 1, c.y), seed), vec2<f32>(s.x, t.y));
-    let n01 = dot(lattice_gradient_2d(vec2<i32>(c.x, c.y + 1), seed), vec2<f32>(t.x, s.y));
-    let n11 = dot(lattice_gradient_2d(c + 1, seed), s);
+    let v = directions_2d(lattice_words_2d(p.cell, p.cell + 1, seed));
+    let n = v.x * vec4<f32>(t.x, s.x, t.x, s.x) + v.y * vec4<f32>(t.y, t.y, s.y, s.y);
     let f = fade_2d(t);
     let g = 1.0 - f;
-    return (n00 * g.x + n10 * f.x) * g.y + (n01 * g.x + n11 * f.x) * f.y;
+    let m = n.xz * g.x + n.yw * f.x;
+    return m.x * g.y + m.y * f.y;
 }
 
 /// Gradient noise in 2D.
@@ -94,26 +105,40 @@ fn gradient_noise_2d(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> f32 {
     return gradient_at_2d(split_2d(cell, frac), seed);
 }
 
+/// The noises of the vectors at four points of a lattice plane of constant x: `dx`, `dy` and `dz` lead from the points to
+/// the sample. Of the vector's three coordinates one is 0 and is left out; which, is decided as in `lattice_gradient_3d`.
+///
+/// internal
+fn plane_noises_3d(words: vec4<u32>, dx: f32, dy: vec4<f32>, dz: vec4<f32>) -> vec4<f32> {
+    let swap = vec4<u32>(LONG_SIDE ^ SHORT_SIDE) & bitcast<vec4<u32>>(bitcast<vec4<i32>>(words << vec4<u32>(11u)) >> vec4<u32>(31u));
+    let p = bitcast<vec4<f32>>(vec4<u32>(LONG_SIDE) ^ swap ^ ((words << vec4<u32>(9u)) & vec4<u32>(SIGN)));
+    let q = bitcast<vec4<f32>>(vec4<u32>(SHORT_SIDE) ^ swap ^ ((words << vec4<u32>(10u)) & vec4<u32>(SIGN)));
+    let share = words & vec4<u32>(0xfffffu);
+    let first = share < vec4<u32>(349526u);
+    let third = share > vec4<u32>(699050u);
+    let x = vec4<f32>(dx);
+    return p * select(select(dz, x, third), dy, first) + q * select(select(x, dy, third), dz, first);
+}
+
 /// Gradient noise at a normalised 3D position.
 ///
 /// internal
 fn gradient_at_3d(p: Lattice3d, seed: u32) -> f32 {
-    let c = p.cell;
     let t = p.frac;
     let s = t - 1.0;
-    let n000 = dot(lattice_gradient_3d(c, seed), t);
-    let n100 = dot(lattice_gradient_3d(vec3<i32>(c.x + 1, c.y, c.z), seed), vec3<f32>(s.x, t.y, t.z));
-    let n010 = dot(lattice_gradient_3d(vec3<i32>(c.x, c.y + 1, c.z), seed), vec3<f32>(t.x, s.y, t.z));
-    let n110 = dot(lattice_gradient_3d(vec3<i32>(c.x + 1, c.y + 1, c.z), seed), vec3<f32>(s.x, s.y, t.z));
-    let n001 = dot(lattice_gradient_3d(vec3<i32>(c.x, c.y, c.z + 1), seed), vec3<f32>(t.x, t.y, s.z));
-    let n101 = dot(lattice_gradient_3d(vec3<i32>(c.x + 1, c.y, c.z + 1), seed), vec3<f32>(s.x, t.y, s.z));
-    let n011 = dot(lattice_gradient_3d(vec3<i32>(c.x, c.y + 1, c.z + 1), seed), vec3<f32>(t.x, s.y, s.z));
-    let n111 = dot(lattice_gradient_3d(c + 1, seed), s);
+    let spread = spread_3d(p.cell, seed);
+    let low = lattice_keys_3d(spread);
+    let high = lattice_keys_3d(spread + SPREAD_3D);
+    let rows = rows_of_keys_3d(low, high);
+    let dy = vec4<f32>(t.y, s.y, t.y, s.y);
+    let dz = vec4<f32>(t.z, t.z, s.z, s.z);
+    let a = plane_noises_3d(words_of_rows_3d(low.x, rows), t.x, dy, dz);
+    let b = plane_noises_3d(words_of_rows_3d(high.x, rows), s.x, dy, dz);
     let f = fade_3d(t);
     let g = 1.0 - f;
-    let n0 = (n000 * g.x + n100 * f.x) * g.y + (n010 * g.x + n110 * f.x) * f.y;
-    let n1 = (n001 * g.x + n101 * f.x) * g.y + (n011 * g.x + n111 * f.x) * f.y;
-    return n0 * g.z + n1 * f.z;
+    let n = a * g.x + b * f.x;
+    let m = n.xz * g.y + n.yw * f.y;
+    return m.x * g.z + m.y * f.z;
 }
 
 /// Gradient noise in 3D.
@@ -133,21 +158,17 @@ fn gradient_noise_3d(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
 /// internal
 fn gradient_between_2d_slope(low: vec2<i32>, high: vec2<i32>, t: vec2<f32>, seed: u32) -> vec3<f32> {
     let s = t - 1.0;
-    let g00 = lattice_gradient_2d(low, seed);
-    let g10 = lattice_gradient_2d(vec2<i32>(high.x, low.y), seed);
-    let g01 = lattice_gradient_2d(vec2<i32>(low.x, high.y), seed);
-    let g11 = lattice_gradient_2d(high, seed);
-    let n00 = dot(g00, t);
-    let n10 = dot(g10, vec2<f32>(s.x, t.y));
-    let n01 = dot(g01, vec2<f32>(t.x, s.y));
-    let n11 = dot(g11, s);
+    let v = directions_2d(lattice_words_2d(low, high, seed));
+    let n = v.x * vec4<f32>(t.x, s.x, t.x, s.x) + v.y * vec4<f32>(t.y, t.y, s.y, s.y);
     let f = fade_2d(t);
     let g = 1.0 - f;
-    let n0 = n00 * g.x + n10 * f.x;
-    let n1 = n01 * g.x + n11 * f.x;
-    let across = vec2<f32>((n10 - n00) * g.y + (n11 - n01) * f.y, n1 - n0);
-    let mean = (g00 * g.x + g10 * f.x) * g.y + (g01 * g.x + g11 * f.x) * f.y;
-    return vec3<f32>(n0 * g.y + n1 * f.y, mean + fade_slope_2d(t) * across);
+    let m = n.xz * g.x + n.yw * f.x;
+    let rise = n.yw - n.xz;
+    let across = vec2<f32>(rise.x * g.y + rise.y * f.y, m.y - m.x);
+    let along_x = v.x.xz * g.x + v.x.yw * f.x;
+    let along_y = v.y.xz * g.x + v.y.yw * f.x;
+    let mean = vec2<f32>(along_x.x, along_y.x) * g.y + vec2<f32>(along_x.y, along_y.y) * f.y;
+    return vec3<f32>(m.x * g.y + m.y * f.y, mean + fade_slope_2d(t) * across);
 }
 
 /// Gradient noise and its gradient at a normalised 2D position.

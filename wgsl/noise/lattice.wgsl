@@ -17,6 +17,11 @@ const SHIFT_3D: vec3<f32> = vec3<f32>(0.171875, 0.203125, 0.390625);
 // 2^32 / golden ratio.
 const SEED_STEP: u32 = 2654435769u;
 
+// Of the fade as 1/2 + s ((s^2 - a)^2 + b): 6^(1/5) / 2^32, a = 5/2 6^(-3/5) and b = 15/8 6^(-1/5) - a^2.
+const FADE_UNIT: f32 = 3.33173452203e-10;
+const FADE_A: f32 = 0.853196879616;
+const FADE_B: f32 = 0.58235593231;
+
 /// A position on a 2D lattice: `cell + frac`.
 struct Lattice2d {
     /// The lattice point below [cell].
@@ -279,15 +284,18 @@ fn fade_3d(t: vec3<f32>) -> vec3<f32> {
     return max(s * w * (w * 6.0 + 2.0) + t, vec3<f32>(0.0));
 }
 
-/// The quintic fade of t = s + 1/2, as a polynomial in s: cheaper, and not held above 0.
+/// The quintic fade of a fraction given as an integer of 2^32 a cell; cheaper than `fade_3d`, and not held above 0.
 ///
-/// domain  s in [-0.5, 0.5] 1 lin
+/// With s = 6^(1/5) (t - 1/2) the fade is 1/2 + s ((s^2 - a)^2 + b), which takes the fewest operations.
+///
+/// domain  fraction in [0, 4294967295] cell/2^32 lin
 /// range   [-1.2e-7, 1.00000012] 1
-/// error   1.5e-7 abs of reference::noise::fade_centred
+/// error   1.8e-7 abs of reference::noise::fade_fraction
 /// source  Perlin2002
-fn fade_centred_3d(s: vec3<f32>) -> vec3<f32> {
-    let q = s * s;
-    return s * (q * (q * 6.0 - 5.0) + 1.875) + 0.5;
+fn fade_fraction_3d(fraction: vec3<u32>) -> vec3<f32> {
+    let s = vec3<f32>(bitcast<vec3<i32>>(fraction ^ vec3<u32>(0x80000000u))) * FADE_UNIT;
+    let d = s * s - FADE_A;
+    return s * (d * d + FADE_B) + 0.5;
 }
 
 /// The position within a torus, in turns of 2^32, at `turns` whole and broken turns from its start.

@@ -8,7 +8,7 @@
 //! symbols  cell lattice point [cell] · frac position within the cell [cell] · seed selects one of 2^32 noises [1]
 #define_import_path veduta::noise::value
 
-#import veduta::hash::lattice::{lattice_hash_2d, lattice_word_3d}
+#import veduta::hash::lattice::{lattice_hash_2d, SPREAD_3D, spread_3d, lattice_keys_3d, rows_of_keys_3d, words_of_rows_3d}
 #import veduta::noise::lattice::{split_2d, split_3d, wrap_2d, wrap_3d, next_cell_2d, next_cell_3d, fade_2d, fade_3d, fade_slope_2d, fade_slope_3d}
 
 // 2^-24: in 2D the corners' numbers are 24-bit integers until the very end.
@@ -21,36 +21,33 @@ fn corner_value_2d(x: i32, y: i32, seed: u32) -> f32 {
     return f32(bitcast<i32>(lattice_hash_2d(vec2<i32>(x, y), seed).x >> 8u));
 }
 
-/// A corner's number in 3D, in [1, 2).
+/// The numbers of the four points of a lattice plane of constant x, each in [1, 2), from the keys of x and of the rows.
 ///
 /// internal
-fn corner_value_3d(x: i32, y: i32, z: i32, seed: u32) -> f32 {
-    return bitcast<f32>((lattice_word_3d(vec3<i32>(x, y, z), seed) & 0x7fffffu) | 0x3f800000u);
+fn plane_values_3d(x: u32, rows: vec4<u32>) -> vec4<f32> {
+    return bitcast<vec4<f32>>((words_of_rows_3d(x, rows) & vec4<u32>(0x7fffffu)) | vec4<u32>(0x3f800000u));
 }
 
-/// Value noise plus 1 between two opposite corners of a cell, which need not be neighbours: periodic lattices wrap them.
+/// Value noise plus 1 between the corners of a cell, from the keys of the lower and the higher coordinates.
 /// `f` is the faded fraction.
 ///
 /// internal
-fn value_plus_one_3d(low: vec3<i32>, high: vec3<i32>, f: vec3<f32>, seed: u32) -> f32 {
-    let a00 = corner_value_3d(low.x, low.y, low.z, seed);
-    let a10 = corner_value_3d(low.x, high.y, low.z, seed);
-    let a01 = corner_value_3d(low.x, low.y, high.z, seed);
-    let a11 = corner_value_3d(low.x, high.y, high.z, seed);
-    let v00 = a00 + f.x * (corner_value_3d(high.x, low.y, low.z, seed) - a00);
-    let v10 = a10 + f.x * (corner_value_3d(high.x, high.y, low.z, seed) - a10);
-    let v01 = a01 + f.x * (corner_value_3d(high.x, low.y, high.z, seed) - a01);
-    let v11 = a11 + f.x * (corner_value_3d(high.x, high.y, high.z, seed) - a11);
-    let v0 = v00 + f.y * (v10 - v00);
-    let v1 = v01 + f.y * (v11 - v01);
-    return v0 + f.z * (v1 - v0);
+fn value_plus_one_3d(low: vec3<u32>, high: vec3<u32>, f: vec3<f32>) -> f32 {
+    let rows = rows_of_keys_3d(low, high);
+    let a = plane_values_3d(low.x, rows);
+    let b = plane_values_3d(high.x, rows);
+    let v = a + f.x * (b - a);
+    let w = v.xz + f.y * (v.yw - v.xz);
+    return w.x + f.z * (w.y - w.x);
 }
 
 /// Value noise between two opposite corners of a cell.
 ///
 /// internal
 fn value_between_3d(low: vec3<i32>, high: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
-    return clamp(value_plus_one_3d(low, high, fade_3d(frac), seed) - 1.0, 0.0, 1.0);
+    let a = lattice_keys_3d(spread_3d(low, seed));
+    let b = lattice_keys_3d(spread_3d(high, seed));
+    return clamp(value_plus_one_3d(a, b, fade_3d(frac)) - 1.0, 0.0, 1.0);
 }
 
 /// Value noise in 2D.
@@ -81,7 +78,9 @@ fn value_noise_2d(cell: vec2<i32>, frac: vec2<f32>, seed: u32) -> f32 {
 /// source  Leitner2022 3.6
 fn value_noise_3d(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
     let p = split_3d(cell, frac);
-    return value_between_3d(p.cell, p.cell + 1, p.frac, seed);
+    let low = spread_3d(p.cell, seed);
+    let n = value_plus_one_3d(lattice_keys_3d(low), lattice_keys_3d(low + SPREAD_3D), fade_3d(p.frac));
+    return clamp(n - 1.0, 0.0, 1.0);
 }
 
 /// Value noise in 3D on a lattice that repeats after `period` cells on each axis.
@@ -166,26 +165,18 @@ fn value_between_3d_slope(low: vec3<i32>, high: vec3<i32>, frac: vec3<f32>, seed
     let f = fade_3d(frac);
     let g = 1.0 - f;
     let df = fade_slope_3d(frac);
-    let v000 = corner_value_3d(low.x, low.y, low.z, seed);
-    let v100 = corner_value_3d(high.x, low.y, low.z, seed);
-    let v010 = corner_value_3d(low.x, high.y, low.z, seed);
-    let v110 = corner_value_3d(high.x, high.y, low.z, seed);
-    let v001 = corner_value_3d(low.x, low.y, high.z, seed);
-    let v101 = corner_value_3d(high.x, low.y, high.z, seed);
-    let v011 = corner_value_3d(low.x, high.y, high.z, seed);
-    let v111 = corner_value_3d(high.x, high.y, high.z, seed);
-    let v00 = v000 * g.x + v100 * f.x;
-    let v10 = v010 * g.x + v110 * f.x;
-    let v01 = v001 * g.x + v101 * f.x;
-    let v11 = v011 * g.x + v111 * f.x;
-    let v0 = v00 * g.y + v10 * f.y;
-    let v1 = v01 * g.y + v11 * f.y;
-    let along_x0 = (v100 - v000) * g.y + (v110 - v010) * f.y;
-    let along_x1 = (v101 - v001) * g.y + (v111 - v011) * f.y;
-    let along_x = along_x0 * g.z + along_x1 * f.z;
-    let along_y = (v10 - v00) * g.z + (v11 - v01) * f.z;
-    let n = clamp(v0 * g.z + v1 * f.z - 1.0, 0.0, 1.0);
-    return vec4<f32>(n, df.x * along_x, df.y * along_y, df.z * (v1 - v0));
+    let a = lattice_keys_3d(spread_3d(low, seed));
+    let b = lattice_keys_3d(spread_3d(high, seed));
+    let rows = rows_of_keys_3d(a, b);
+    let low_x = plane_values_3d(a.x, rows);
+    let high_x = plane_values_3d(b.x, rows);
+    let v = low_x * g.x + high_x * f.x;
+    let w = v.xz * g.y + v.yw * f.y;
+    let rise = high_x - low_x;
+    let along_x = rise.xz * g.y + rise.yw * f.y;
+    let along_y = v.yw - v.xz;
+    let n = clamp(w.x * g.z + w.y * f.z - 1.0, 0.0, 1.0);
+    return vec4<f32>(n, df.x * (along_x.x * g.z + along_x.y * f.z), df.y * (along_y.x * g.z + along_y.y * f.z), df.z * (w.y - w.x));
 }
 
 /// Value noise in 3D and its gradient: (value, d/dx, d/dy, d/dz), per cell.
