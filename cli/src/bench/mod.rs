@@ -1,5 +1,6 @@
 //! Run time against error: the yardstick that judges every effect.
 
+pub mod baseline;
 pub mod chapter6;
 pub mod knob;
 pub mod plot;

@@ -6,7 +6,7 @@ use indicatif::ProgressBar;
 
 use crate::bench::knob::{self, Effect, Knob};
 use crate::bench::timing::{Clock, Rounds};
-use crate::bench::{Bench, chapter6, presets, write_text};
+use crate::bench::{Bench, baseline, chapter6, presets, write_text};
 use crate::catalog::{Catalog, SourceArgs};
 use crate::commands::render::{RenderArgs, write_json};
 use crate::error::CliError;
@@ -21,6 +21,8 @@ pub enum Subject {
     Chapter6,
     /// One knob of one effect.
     Knob,
+    /// One frame of the frozen baseline, and how fast the machine is meanwhile.
+    Baseline,
 }
 
 /// Arguments of `veduta bench`.
@@ -69,7 +71,7 @@ pub struct BenchArgs {
     /// What is measured; processor time on a device in software, else timestamps, else wall time
     #[arg(long, value_enum)]
     pub clock: Option<Clock>,
-    /// A file (presets) or a folder (chapter6, knob) for the results; the table goes to stdout as well
+    /// A file (presets, baseline) or a folder (chapter6, knob) for the results; the table goes to stdout as well
     #[arg(long, value_name = "PATH")]
     pub out: Option<PathBuf>,
     /// A folder for converged pictures, which later runs take from there
@@ -117,7 +119,7 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
             ));
         }
         (None, Some(_)) => Subject::Knob,
-        (Some(Subject::Presets | Subject::Chapter6), Some(knob)) => {
+        (Some(Subject::Presets | Subject::Chapter6 | Subject::Baseline), Some(knob)) => {
             return Err(CliError::argument(
                 "--knob",
                 knob.as_str(),
@@ -178,6 +180,15 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
             if let Some(path) = &args.out {
                 write_text(path, &text)?;
                 write_json(&path.with_extension("json"), &presets::to_json(&entries))?;
+            }
+        }
+        Subject::Baseline => {
+            let rounds = baseline::run(&bench, rounds.least, &mut progress)?;
+            bar.finish_and_clear();
+            let text = baseline::markdown(&bench, &rounds, &command);
+            print!("{text}");
+            if let Some(path) = &args.out {
+                write_text(path, &text)?;
             }
         }
         Subject::Chapter6 => {

@@ -2,7 +2,7 @@
 
 use veduta_cli::bench::knob::{self, Effect, Knob};
 use veduta_cli::bench::timing::{Clock, Rounds, in_turns};
-use veduta_cli::bench::{Bench, chapter6, presets};
+use veduta_cli::bench::{Bench, baseline, chapter6, presets};
 use veduta_cli::catalog::{Catalog, SourceArgs};
 use veduta_cli::commands::render::RenderArgs;
 use veduta_cli::render::Size;
@@ -248,6 +248,45 @@ fn a_subject_against_itself_has_the_ratio_1() {
     let ratio = veduta_cli::bench::timing::Ratio::of(&times[1], &times[0]);
     println!("against itself: {ratio} +- {:.3}", ratio.uncertainty);
     assert!((0.4..2.5).contains(&ratio.median), "{ratio:?}");
+}
+
+#[test]
+fn the_baseline_is_measured_beside_the_machine() {
+    let dir = folder("bench_baseline");
+    veduta(
+        &dir,
+        &[
+            "bench",
+            "baseline",
+            "--size",
+            "48x27",
+            "--rounds",
+            "2",
+            "--out",
+            "baseline.md",
+        ],
+    )
+    .good();
+    let text = std::fs::read_to_string(dir.join("baseline.md")).unwrap();
+    for part in [
+        "PCG, one chain",
+        "`thesis_skip`",
+        "at the aim's speed",
+        "--size 48x27",
+    ] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+    // At half the speed a frame counts half.
+    let round = baseline::Round {
+        speed: baseline::Speed {
+            chain: 0.5 * baseline::AIM_SPEED.chain,
+            side_by_side: baseline::AIM_SPEED.side_by_side,
+        },
+        thesis: 600.0,
+        skip: 300.0,
+        clear: 200.0,
+    };
+    assert_eq!(round.at_the_speed_of_the_aim(), (300.0, 600.0));
 }
 
 #[test]
