@@ -1,6 +1,6 @@
 //! Single scattering of sunlight in a spherical atmosphere. Radiance is relative to the sun's irradiance outside the air.
 
-use super::math::{Integral, dot, gauss_legendre, integrate_adaptive, length};
+use super::math::{dot, gauss_legendre, length};
 use super::phase::{phase_cornette_shanks, phase_rayleigh};
 use super::planet::{
     altitude_along, direction_cosine_along, ground_distance, sphere_span, top_distance,
@@ -178,87 +178,6 @@ pub fn air_column_exact(atmosphere: &Atmosphere, h: f64, mu: f64, distance: f64)
         }
     }
     sum
-}
-
-/// Sky light by adaptive quadrature to the absolute `tolerance` of the two integrals (m), split at the planet's shadow;
-/// the error estimate is that of the larger integral (m).
-pub fn sky_adaptive(
-    atmosphere: &Atmosphere,
-    eye_altitude: f64,
-    dir: [f64; 3],
-    to_sun: [f64; 3],
-    distance: f64,
-    tolerance: f64,
-) -> (SkyLight, f64) {
-    let radius = atmosphere.ground_radius;
-    let nu = dot(dir, to_sun);
-    let (near, end) = view_span(atmosphere, eye_altitude, dir[1], distance);
-    let lit = |t: f64| {
-        let h = altitude_along(radius, eye_altitude, dir[1], t).max(0.0);
-        ground_distance(
-            radius,
-            h,
-            direction_cosine_along(radius, eye_altitude, h, to_sun[1], nu, t),
-        ) < 0.0
-    };
-    let integrand = |t: f64| -> [f64; 6] {
-        let h = altitude_along(radius, eye_altitude, dir[1], t).max(0.0);
-        let mu = direction_cosine_along(radius, eye_altitude, h, to_sun[1], nu, t);
-        if ground_distance(radius, h, mu) >= 0.0 {
-            return [0.0; 6];
-        }
-        let sun = air_column_exact(
-            atmosphere,
-            h,
-            mu,
-            top_distance(radius, atmosphere.top, h, mu),
-        );
-        let start = air_column_exact(atmosphere, eye_altitude, dir[1], near);
-        let view = air_column_exact(atmosphere, eye_altitude, dir[1], t);
-        let light = column_transmittance(
-            atmosphere,
-            std::array::from_fn(|k| sun[k] + view[k] - start[k]),
-        );
-        let density = air_density(atmosphere, h);
-        std::array::from_fn(|k| light[k % 3] * density[k / 3])
-    };
-    // Borders of the shadow, by bisection between 512 probes.
-    let mut borders = vec![near];
-    let probe = |i: i32| near + (end - near) * f64::from(i) / 512.0;
-    for i in 0..512 {
-        let (mut a, mut b) = (probe(i), probe(i + 1));
-        if lit(a) != lit(b) {
-            for _ in 0..60 {
-                let middle = 0.5 * (a + b);
-                if lit(middle) == lit(a) {
-                    a = middle
-                } else {
-                    b = middle
-                }
-            }
-            borders.push(0.5 * (a + b));
-        }
-    }
-    borders.push(end);
-    let mut total = Integral {
-        value: [0.0; 6],
-        error: 0.0,
-    };
-    for pair in borders.windows(2) {
-        let part = integrate_adaptive(&integrand, pair[0], pair[1], tolerance);
-        total.error += part.error;
-        for k in 0..6 {
-            total.value[k] += part.value[k];
-        }
-    }
-    let [r0, r1, r2, m0, m1, m2] = total.value;
-    let start = air_column_exact(atmosphere, eye_altitude, dir[1], near);
-    let whole = air_column_exact(atmosphere, eye_altitude, dir[1], end);
-    let light = SkyLight {
-        in_scatter: radiance(atmosphere, nu, [r0, r1, r2], [m0, m1, m2]),
-        transmittance: column_transmittance(atmosphere, [whole[0] - start[0], whole[1] - start[1]]),
-    };
-    (light, total.error)
 }
 
 /// Radiance of the sun's disc for an irradiance of 1, with a linear ramp of `pixel_angle` across the limb.

@@ -416,6 +416,7 @@ fn row_l38_every_quality_key_acts_where_it_should() {
         ("ATMOS_LIGHT_STEPS", int(3), &[], Everything),
         ("LOW_QUALITY", on, &[], Everything),
         ("COUNT_OPERATIONS", on, &[], Everything),
+        ("SHOW_DISTANCE", on, &[], Everything),
     ];
     for key in programs().keys.iter() {
         // A scene turns these on, and the target's format decides on the last.

@@ -3,7 +3,7 @@
 
 use crate::common::{Random, cpu_seconds};
 use std::f64::consts::PI;
-use veduta::reference::atmosphere::{Atmosphere, sky_adaptive};
+use veduta::reference::atmosphere::Atmosphere;
 use veduta::reference::clouds::{CloudLayer, cloud_density, march_clouds, slab_single_scatter};
 use veduta::reference::intersect::{Bracketing, Search, first_crossing, lipschitz_of_terrain};
 use veduta::reference::math::{dot, normalize};
@@ -408,30 +408,6 @@ fn reference_sky_scattered_once_agrees_with_closed_forms() {
         assert!((found.reflected[k] / reflected - 1.0).abs() < 1e-9);
         assert!((found.in_scatter[k] - exact).abs() <= found.error[k] + 1e-12 * exact);
     }
-    // Without ozone, against the older adaptive integration of the twin.
-    let rays = sky_rays(60, 34);
-    let pairs = parallel_map(rays.len(), |i| {
-        let ray = &rays[i];
-        let distance = ray.distance.min(1e9);
-        let (twin, _) = sky_adaptive(
-            &sky.air,
-            ray.eye_altitude,
-            ray.dir,
-            ray.to_sun,
-            distance,
-            1e-3,
-        );
-        (sky.single_scatter(ray, 1e-9), twin)
-    });
-    let mut apart: f64 = 0.0;
-    for (found, twin) in &pairs {
-        for k in 0..3 {
-            apart = apart.max((found.in_scatter[k] - twin.in_scatter[k]).abs());
-            apart = apart.max((found.transmittance[k] - twin.transmittance[k]).abs());
-        }
-    }
-    println!("60 rays against the twin's own adaptive rule: {apart:.1e} absolute");
-    assert!(apart < 1e-8);
 }
 
 #[test]

@@ -360,6 +360,9 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     }
 #endif
 #endif
+#ifdef SHOW_DISTANCE
+    return vec4<f32>(select(distance, -1.0, distance == FAR), 0.0, 0.0, 1.0);
+#else
 #ifdef COUNT_OPERATIONS
     return vec4<f32>(f32(work.noise), f32(work.density), f32(work.light), f32(work.air));
 #else
@@ -372,6 +375,7 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
         return vec4<f32>(decode_srgb(shown), 1.0);
     }
     return vec4<f32>(shown, 1.0);
+#endif
 #endif
 }
     }#

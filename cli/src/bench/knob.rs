@@ -7,11 +7,12 @@ use veduta::{ProgramSet, Value};
 
 use super::plot::{Plot, Series};
 use super::timing::{Middle, Ratio, Rounds, in_turns};
-use super::{Bench, decibels, pareto, side_by_side, table, write_text};
+use super::truth::Truth;
+use super::{Bench, JUDGED, judged_cells, judged_json, pareto, side_by_side, table, write_text};
 use crate::commands::render::{Job, write_json};
 use crate::error::CliError;
 use crate::image::write_png;
-use crate::metrics::{Difference, Picture};
+use crate::metrics::{DepthDifference, Difference, Picture, depth_difference};
 
 /// What is judged: it decides on the scene, and on what the converged picture is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -136,6 +137,10 @@ pub struct Entry {
     pub counts: [f64; 4],
     /// From the converged picture.
     pub difference: Difference,
+    /// Relative RMSE of the effect alone from the f64 reference, where there is one.
+    pub to_truth: Option<f64>,
+    /// Where the rays meet the ground, against the converged rays; of effects of the ground.
+    pub depth: Option<DepthDifference>,
     /// Nothing that was measured is both faster and nearer.
     pub on_front: bool,
 }
@@ -149,6 +154,8 @@ pub struct Report {
     pub pictures: Vec<Vec<u8>>,
     /// What the converged picture is.
     pub reference: String,
+    /// The f64 reference, where there is one.
+    pub truth: Option<Truth>,
 }
 
 /// Measures all values of a knob on a view with a preset.
@@ -183,6 +190,25 @@ pub fn run(
     progress("times");
     let times = in_turns(&mut subjects, &[0], bench.clock, rounds, &mut || {})?;
     drop(subjects);
+    progress("f64 reference");
+    let alone = |value: Option<&Value>| -> Result<Option<Job>, CliError> {
+        let Some(flags) = effect.alone() else {
+            return Ok(None);
+        };
+        let mut values = [off, flags].concat();
+        values.extend(value.map(|v| (knob.key.as_str(), *v)));
+        Ok(Some(bench.job(scene, preset, view, &values)?))
+    };
+    let truth = match alone(None)? {
+        Some(job) => Truth::of(bench, effect, &job)?,
+        None => None,
+    };
+    let grounded = matches!(effect, Effect::Terrain | Effect::All);
+    let true_depths = if grounded {
+        target.distances(&bench.gpu, bench.size, 0.0)?
+    } else {
+        Vec::new()
+    };
     let mut entries = Vec::new();
     let mut pictures = Vec::new();
     for (k, value) in knob.values.iter().enumerate() {
@@ -190,12 +216,24 @@ pub fn run(
         let job = &jobs[k + 1];
         let picture = bench.picture(job, 0.0, 1)?;
         let counts = job.operation_counts(&bench.gpu, bench.size, 0.0)?;
+        let to_truth = match (&truth, alone(Some(value))?) {
+            (Some(truth), Some(job)) => Some(truth.relative_rmse(&bench.picture(&job, 0.0, 1)?)),
+            _ => None,
+        };
+        let depth = if grounded {
+            let depths = job.distances(&bench.gpu, bench.size, 0.0)?;
+            Some(depth_difference(&depths, &true_depths))
+        } else {
+            None
+        };
         entries.push(Entry {
             value: *value,
             time: Middle::of(&times[k + 1]),
             ratio: Ratio::of(&times[k + 1], &times[0]),
             counts: counts.map(|c| c.0),
             difference: picture.difference(&reference, exposure)?,
+            to_truth,
+            depth,
             on_front: false,
         });
         pictures.push(picture.display(exposure));
@@ -216,6 +254,7 @@ pub fn run(
         entries,
         pictures,
         reference: format!("{}, {} rays a pixel", values.join(" "), samples * samples),
+        truth,
     })
 }
 
@@ -226,43 +265,41 @@ pub fn markdown(bench: &Bench, knob: &Knob, report: &Report, command: &str) -> S
         knob.key,
         bench.machine()
     );
-    text += &format!(
-        "- reference: {}\n- `front`: nothing here is both faster and nearer to the reference\n\n",
-        report.reference
-    );
-    let mut rows = vec![
-        [
-            knob.key.as_str(),
-            "time [ms]",
-            "/ preset",
-            "noise",
-            "density",
-            "light",
-            "air",
-            "PSNR [dB]",
-            "FLIP",
-            "rel. RMSE",
-            "worst pixel",
-            "front",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
-    ];
+    text += &format!("- reference: {}\n", report.reference);
+    if let Some(truth) = &report.truth {
+        text += &format!(
+            "- f64: relative RMSE of the effect alone on {} rays of the sky from {}, whose own error it estimates at {:.1e}\n",
+            truth.pixels.len(),
+            truth.what,
+            truth.uncertainty
+        );
+    }
+    let grounded = report.entries.iter().any(|e| e.depth.is_some());
+    if grounded {
+        text += "- flips: rays that meet the ground here and not in the reference, or the reverse; depth: relative difference of the\n  distances of the others, that which 1 % exceed\n";
+    }
+    text += "- `front`: nothing here is both faster and nearer to the reference\n\n";
+    let mut head = [&[knob.key.as_str(), "time [ms]", "/ preset"][..], &JUDGED].concat();
+    if report.truth.is_some() {
+        head.push("f64");
+    }
+    if grounded {
+        head.extend(["flips", "depth"]);
+    }
+    head.push("front");
+    let mut rows = vec![head.into_iter().map(str::to_owned).collect()];
     for e in &report.entries {
-        let d = &e.difference;
         let mut row = vec![
             e.value.to_string(),
             format!("{:.1}", e.time.median),
             e.ratio.to_string(),
         ];
-        row.extend(e.counts.map(|c| format!("{c:.1}")));
-        row.extend([
-            decibels(d.psnr),
-            d.flip.map_or("-".to_owned(), |f| format!("{f:.4}")),
-            format!("{:.5}", d.relative_rmse),
-            format!("{} at ({}, {})", d.worst.steps, d.worst.x, d.worst.y),
-            if e.on_front { "front" } else { "" }.to_owned(),
-        ]);
+        row.extend(judged_cells(&e.counts, &e.difference));
+        row.extend(e.to_truth.map(|t| format!("{t:.5}")));
+        if let Some(d) = &e.depth {
+            row.extend([d.flips.to_string(), format!("{:.1e}", d.percentile_99)]);
+        }
+        row.push(if e.on_front { "front" } else { "" }.to_owned());
         rows.push(row);
     }
     text + &table(&rows)
@@ -289,13 +326,21 @@ pub fn write(
         .entries
         .iter()
         .map(|e| {
-            json!({
+            let mut entry = json!({
                 "value": e.value.to_string(), "time_ms": e.time.median, "ratio": e.ratio.median,
-                "uncertainty": e.ratio.uncertainty, "conclusive": e.ratio.conclusive(),
-                "noise": e.counts[0], "density": e.counts[1], "light": e.counts[2], "air": e.counts[3],
-                "psnr_db": e.difference.psnr, "flip": e.difference.flip, "relative_rmse": e.difference.relative_rmse,
-                "front": e.on_front,
-            })
+                "uncertainty": e.ratio.uncertainty, "conclusive": e.ratio.conclusive(), "front": e.on_front,
+            });
+            judged_json(&mut entry, &e.counts, &e.difference);
+            if let Some(to_truth) = e.to_truth {
+                entry["to_f64"] = to_truth.into();
+            }
+            if let Some(d) = &e.depth {
+                entry["flips"] = d.flips.into();
+                entry["depth"] = json!({
+                    "both": d.both, "median": d.median, "percentile_99": d.percentile_99, "largest": d.largest,
+                });
+            }
+            entry
         })
         .collect();
     let document = json!({ "key": knob.key, "reference": report.reference, "entries": entries });

@@ -6,6 +6,7 @@ pub mod knob;
 pub mod plot;
 pub mod presets;
 pub mod timing;
+pub mod truth;
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
@@ -15,7 +16,7 @@ use veduta::{Value, View, wgpu};
 
 use crate::commands::render::{Job, RenderArgs};
 use crate::error::CliError;
-use crate::metrics::Picture;
+use crate::metrics::{Difference, Picture};
 use crate::render::{Output, Renderer, Size, Tiling};
 
 /// What a bench draws with.
@@ -197,6 +198,43 @@ pub fn table(rows: &[Vec<String>]) -> String {
         }
     }
     text
+}
+
+/// The heads of [`judged_cells`].
+pub const JUDGED: [&str; 8] = [
+    "noise",
+    "density",
+    "light",
+    "air",
+    "PSNR [dB]",
+    "FLIP",
+    "rel. RMSE",
+    "worst pixel",
+];
+
+/// A picture's counts a pixel and its distance from a reference, as cells of a table.
+pub fn judged_cells(counts: &[f64; 4], difference: &Difference) -> Vec<String> {
+    let d = difference;
+    let mut cells: Vec<String> = counts.iter().map(|c| format!("{c:.1}")).collect();
+    cells.extend([
+        decibels(d.psnr),
+        d.flip.map_or("-".to_owned(), |f| format!("{f:.4}")),
+        format!("{:.5}", d.relative_rmse),
+        format!("{} at ({}, {})", d.worst.steps, d.worst.x, d.worst.y),
+    ]);
+    cells
+}
+
+/// The same as members of `object`.
+pub fn judged_json(object: &mut serde_json::Value, counts: &[f64; 4], difference: &Difference) {
+    for (name, count) in JUDGED.iter().zip(counts) {
+        object[*name] = (*count).into();
+    }
+    let d = difference;
+    object["psnr_db"] = d.psnr.into();
+    object["flip"] = d.flip.into();
+    object["relative_rmse"] = d.relative_rmse.into();
+    object["worst"] = serde_json::json!({ "x": d.worst.x, "y": d.worst.y, "steps": d.worst.steps });
 }
 
 /// A decibel figure; equal pictures have none.

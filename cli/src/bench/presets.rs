@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::timing::{Middle, Ratio, Rounds, in_turns};
-use super::{Bench, decibels, table};
+use super::{Bench, JUDGED, decibels, judged_cells, judged_json, table};
 use crate::error::CliError;
 use crate::metrics::Difference;
 
@@ -181,39 +181,22 @@ pub fn markdown(bench: &Bench, plan: &Plan, entries: &[Entry], command: &str) ->
     text += &table(&rows);
     for name in &names {
         text += &format!("\n## `{name}`\n\n");
+        let head = ["view", "time [ms]", "/ thesis", "/ thesis_skip"];
         let mut rows = vec![
-            [
-                "view",
-                "time [ms]",
-                "/ thesis",
-                "/ thesis_skip",
-                "noise",
-                "density",
-                "light",
-                "air",
-                "PSNR [dB]",
-                "FLIP",
-                "rel. RMSE",
-                "worst pixel",
-            ]
-            .map(str::to_owned)
-            .to_vec(),
+            [&head[..], &JUDGED]
+                .concat()
+                .into_iter()
+                .map(str::to_owned)
+                .collect(),
         ];
         for e in of(name) {
-            let d = &e.difference;
             let mut row = vec![
                 e.view.clone(),
                 format!("{:.1}", e.time.median),
                 e.to_thesis.to_string(),
                 e.to_skip.to_string(),
             ];
-            row.extend(e.counts.map(|c| format!("{c:.1}")));
-            row.extend([
-                decibels(d.psnr),
-                d.flip.map_or("-".to_owned(), |f| format!("{f:.4}")),
-                format!("{:.4}", d.relative_rmse),
-                format!("{} at ({}, {})", d.worst.steps, d.worst.x, d.worst.y),
-            ]);
+            row.extend(judged_cells(&e.counts, &e.difference));
             rows.push(row);
         }
         text += &table(&rows);
@@ -227,19 +210,16 @@ pub fn to_json(entries: &[Entry]) -> serde_json::Value {
     entries
         .iter()
         .map(|e| {
-            json!({
+            let mut entry = json!({
                 "preset": e.preset,
                 "view": e.view,
                 "time_ms": e.time.median,
                 "quartiles_ms": [e.time.quartiles.0, e.time.quartiles.1],
                 "to_thesis": ratio(e.to_thesis),
                 "to_thesis_skip": ratio(e.to_skip),
-                "noise": e.counts[0], "density": e.counts[1], "light": e.counts[2], "air": e.counts[3],
-                "psnr_db": e.difference.psnr,
-                "flip": e.difference.flip,
-                "relative_rmse": e.difference.relative_rmse,
-                "worst": { "x": e.difference.worst.x, "y": e.difference.worst.y, "steps": e.difference.worst.steps },
-            })
+            });
+            judged_json(&mut entry, &e.counts, &e.difference);
+            entry
         })
         .collect()
 }

@@ -412,17 +412,37 @@ impl Job {
         size: Size,
         time: f64,
     ) -> Result<[(f64, f64); 4], CliError> {
+        Ok(operation_counts(&self.measured(
+            "COUNT_OPERATIONS",
+            gpu,
+            size,
+            time,
+        )?))
+    }
+
+    /// Distances in metres to the ground or the planet, row by row; -1 where a ray meets neither. From the variant with
+    /// SHOW_DISTANCE, which is composed now if it was not built.
+    ///
+    /// # Errors
+    /// Faults of composing and of the device.
+    pub fn distances(&self, gpu: &Gpu, size: Size, time: f64) -> Result<Vec<f64>, CliError> {
+        let rgba = self.measured("SHOW_DISTANCE", gpu, size, time)?;
+        Ok(rgba.iter().step_by(4).map(|d| f64::from(*d)).collect())
+    }
+
+    /// What the variant with a flag that replaces the picture by numbers draws.
+    fn measured(&self, flag: &str, gpu: &Gpu, size: Size, time: f64) -> Result<Vec<f32>, CliError> {
         let mut job = self.clone();
         job.options
             .values
-            .push(("COUNT_OPERATIONS".to_owned(), Value::Flag(true)));
+            .push((flag.to_owned(), Value::Flag(true)));
         job.settings
-            .set(self.catalog.set(), "COUNT_OPERATIONS", Value::Flag(true))?;
+            .set(self.catalog.set(), flag, Value::Flag(true))?;
         let (program, _) = self.names()?;
         job.catalog.ensure(&program, &job.settings)?;
         let mut renderer =
             Renderer::new(gpu, job.catalog.set(), &job.options, size, Output::Linear)?;
         renderer.draw(&job.view(time, size)?, Tiling::Adaptive, &mut |_| {})?;
-        Ok(operation_counts(&renderer.read_rgba32()?))
+        renderer.read_rgba32()
     }
 }
