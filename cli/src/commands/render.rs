@@ -412,6 +412,19 @@ impl Job {
         size: Size,
         time: f64,
     ) -> Result<[(f64, f64); 4], CliError> {
+        self.operation_counts_at(gpu, size, &self.view(time, size)?)
+    }
+
+    /// [`Job::operation_counts`] as any view sees it.
+    ///
+    /// # Errors
+    /// Faults of composing and of the device.
+    pub fn operation_counts_at(
+        &self,
+        gpu: &Gpu,
+        size: Size,
+        view: &veduta::View,
+    ) -> Result<[(f64, f64); 4], CliError> {
         let mut job = self.clone();
         job.options
             .values
@@ -422,7 +435,7 @@ impl Job {
         job.catalog.ensure(&program, &job.settings)?;
         let mut renderer =
             Renderer::new(gpu, job.catalog.set(), &job.options, size, Output::Linear)?;
-        renderer.draw(&job.view(time, size)?, Tiling::Adaptive, &mut |_| {})?;
+        renderer.draw(view, Tiling::Adaptive, &mut |_| {})?;
         Ok(operation_counts(&renderer.read_rgba32()?))
     }
 }
