@@ -800,6 +800,7 @@ fn a_feature_that_is_not_named_adds_no_byte() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let source = Source::read(&[&root.join("wgsl"), &root.join("presets")]).unwrap();
     let text = std::fs::read_to_string(root.join("wgsl/programs/landscape.sp")).unwrap();
+    let mut texts = std::collections::BTreeMap::new();
     for set in feature_sets() {
         let name = if set.is_empty() {
             "NOTHING".to_owned()
@@ -849,7 +850,12 @@ fn a_feature_that_is_not_named_adds_no_byte() {
                 );
             }
         }
+        // What is drawn decides on the text, and all of it.
+        let drawn = FEATURES.map(|f| draws(&set, f.0));
+        assert_eq!(texts.entry(drawn).or_insert(whole.clone()), &whole);
     }
+    let distinct: std::collections::BTreeSet<_> = texts.values().collect();
+    assert_eq!((texts.len(), distinct.len()), (8, 8));
 }
 
 fn copy(from: &std::path::Path, to: &std::path::Path) {
