@@ -231,7 +231,7 @@ impl Variant {
         let kept = landscape.resources();
         let mut moved = self.view;
         moved.eye = moved.eye.moved_by(DVec3::ONE);
-        frame(gpu, &mut landscape, &self.view)?;
+        let _ = frame(gpu, &mut landscape, &self.view)?;
         let (moving, drawn) = frame(gpu, &mut landscape, &moved)?;
         let (still, _) = frame(gpu, &mut landscape, &moved)?;
         let reflected = program.bindings.len();
