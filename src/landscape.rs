@@ -3,8 +3,10 @@
 use glam::Vec3;
 
 use crate::error::Error;
-use crate::program::{PipelineOptions, ProgramSet, ReadyPipeline, Value};
-use crate::programs::blocks::{Anchors, View as ViewBlock};
+use crate::program::{
+    ComposedProgram, PipelineOptions, ProgramSet, ReadyPipeline, StructLayout, Value,
+};
+use crate::programs::blocks::View as ViewBlock;
 use crate::settings::{Preset, Settings};
 use crate::view::{View, WorldPos};
 
@@ -70,8 +72,31 @@ pub struct Work {
     pub dispatches: u32,
     /// Draw calls recorded.
     pub draws: u32,
+    /// Buffers written.
+    pub writes: u32,
     /// Bytes uploaded.
     pub bytes: u64,
+}
+
+/// What a system keeps on the device for as long as it lives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Resources {
+    /// Pipelines.
+    pub pipelines: u32,
+    /// Bind groups.
+    pub bind_groups: u32,
+    /// Resources bound in them.
+    pub bindings: u32,
+    /// Buffers.
+    pub buffers: u32,
+    /// Bytes of all buffers.
+    pub buffer_bytes: u64,
+    /// Textures; those that the host draws into are its own.
+    pub textures: u32,
+    /// Bytes of all textures.
+    pub texture_bytes: u64,
+    /// Samplers.
+    pub samplers: u32,
 }
 
 /// Choices that are made once.
@@ -118,22 +143,70 @@ pub struct Landscape {
     settings: Settings,
     programs: ProgramSet,
     pipeline: wgpu::RenderPipeline,
-    content_layout: crate::program::StructLayout,
-    blocks: [Block; 3],
-    groups: [wgpu::BindGroup; 2],
+    blocks: Vec<Block>,
+    groups: Vec<wgpu::BindGroup>,
     frame: u32,
+    /// View and frame that the blocks hold; `None` when content has changed since.
+    prepared: Option<(View, u32)>,
+}
+
+/// What a uniform block of the program holds. A variant has only the blocks that it reads.
+#[derive(Debug, Clone)]
+enum Holds {
+    View,
+    Content(StructLayout),
+    Anchors(StructLayout),
 }
 
 /// A uniform buffer that is written only when its bytes have changed.
 #[derive(Debug)]
 struct Block {
+    holds: Holds,
+    group: u32,
+    binding: u32,
     buffer: wgpu::Buffer,
     bytes: Vec<u8>,
 }
 
 impl Block {
-    fn new(device: &wgpu::Device, label: &str, size: u64) -> Block {
-        Block {
+    /// The block at a binding; `None` when the program reads none there.
+    fn new(
+        device: &wgpu::Device,
+        program: &ComposedProgram,
+        [group, binding]: [u32; 2],
+    ) -> Result<Option<Block>, Error> {
+        if !program
+            .bindings
+            .iter()
+            .any(|b| b.group == group && b.binding == binding)
+        {
+            return Ok(None);
+        }
+        let layout = |name| {
+            program
+                .layout(name)
+                .cloned()
+                .ok_or_else(|| Error::MissingStage {
+                    program: program.program.to_string(),
+                })
+        };
+        let (label, size, holds) = match (group, binding) {
+            (0, _) => ("veduta view", ViewBlock::SIZE as u64, Holds::View),
+            (_, 0) => {
+                let layout = layout("Content")?;
+                let size = u64::from(layout.size);
+                ("veduta content", size, Holds::Content(layout))
+            }
+            _ => {
+                let layout = layout("Anchors")?;
+                let size = u64::from(layout.size);
+                ("veduta anchors", size, Holds::Anchors(layout))
+            }
+        };
+        Ok(Some(Block {
+            holds,
+            group,
+            binding,
             buffer: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
                 size,
@@ -141,16 +214,20 @@ impl Block {
                 mapped_at_creation: false,
             }),
             bytes: Vec::new(),
-        }
+        }))
     }
 
-    fn update(&mut self, queue: &wgpu::Queue, bytes: &[u8]) -> u64 {
+    fn update(&mut self, queue: &wgpu::Queue, bytes: Vec<u8>) -> Work {
         if self.bytes == bytes {
-            return 0;
+            return Work::default();
         }
-        queue.write_buffer(&self.buffer, 0, bytes);
-        self.bytes = bytes.to_vec();
-        bytes.len() as u64
+        queue.write_buffer(&self.buffer, 0, &bytes);
+        self.bytes = bytes;
+        Work {
+            writes: 1,
+            bytes: self.bytes.len() as u64,
+            ..Default::default()
+        }
     }
 }
 
@@ -253,58 +330,57 @@ impl Landscape {
                 ..Default::default()
             },
         )?;
-        let (crate::program::Pipeline::Render(pipeline), [view_layout, content_group_layout]) =
-            (pipeline, bind_group_layouts.as_slice())
-        else {
+        let crate::program::Pipeline::Render(pipeline) = pipeline else {
             return Err(Error::MissingStage {
                 program: program.program.to_string(),
             });
         };
-        let content_layout = program
-            .layout("Content")
-            .ok_or_else(|| Error::MissingStage {
-                program: program.program.to_string(),
-            })?
-            .clone();
-        let blocks = [
-            Block::new(device, "veduta view", ViewBlock::SIZE as u64),
-            Block::new(device, "veduta content", u64::from(content_layout.size)),
-            Block::new(device, "veduta anchors", Anchors::SIZE as u64),
-        ];
-        let group = |layout, blocks: &[&Block]| {
-            let entries: Vec<wgpu::BindGroupEntry<'_>> = blocks
-                .iter()
-                .zip(0..)
-                .filter(|(_, binding)| {
-                    program
-                        .bindings
-                        .iter()
-                        .any(|b| b.group == u32::from(blocks.len() > 1) && b.binding == *binding)
+        let mut blocks = Vec::new();
+        for place in [[0, 0], [1, 0], [1, 1]] {
+            blocks.extend(Block::new(device, program, place)?);
+        }
+        let groups = bind_group_layouts
+            .iter()
+            .zip(0..)
+            .map(|(layout, group)| {
+                let entries: Vec<wgpu::BindGroupEntry<'_>> = blocks
+                    .iter()
+                    .filter(|block| block.group == group)
+                    .map(|block| wgpu::BindGroupEntry {
+                        binding: block.binding,
+                        resource: block.buffer.as_entire_binding(),
+                    })
+                    .collect();
+                device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some("veduta landscape"),
+                    layout,
+                    entries: &entries,
                 })
-                .map(|(block, binding)| wgpu::BindGroupEntry {
-                    binding,
-                    resource: block.buffer.as_entire_binding(),
-                })
-                .collect();
-            device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("veduta landscape"),
-                layout,
-                entries: &entries,
             })
-        };
-        let groups = [
-            group(view_layout, &[&blocks[0]]),
-            group(content_group_layout, &[&blocks[1], &blocks[2]]),
-        ];
+            .collect();
         Ok(Landscape {
             settings,
             programs: programs.clone(),
             pipeline,
-            content_layout,
             blocks,
             groups,
             frame: 0,
+            prepared: None,
         })
+    }
+
+    /// What it keeps on the device.
+    pub fn resources(&self) -> Resources {
+        let blocks = self.blocks.len() as u32;
+        Resources {
+            pipelines: 1,
+            bind_groups: self.groups.len() as u32,
+            bindings: blocks,
+            buffers: blocks,
+            buffer_bytes: self.blocks.iter().map(|b| b.buffer.size()).sum(),
+            // The textbook picture reads parameters only.
+            ..Default::default()
+        }
     }
 
     /// The resolved values.
@@ -329,10 +405,13 @@ impl Landscape {
                 expected: "content; a quality key is given to `Landscape::new`".to_owned(),
             });
         }
-        self.settings.set(&self.programs, name, value)
+        self.settings.set(&self.programs, name, value)?;
+        self.prepared = None;
+        Ok(())
     }
 
-    fn anchors(&self, eye: WorldPos) -> Result<Anchors, Error> {
+    /// The bytes of the block `Anchors`, which has the members of the variant's features only.
+    fn anchors(&self, layout: &StructLayout, eye: WorldPos) -> Result<Vec<u8>, Error> {
         let foot = WorldPos {
             cell: glam::I64Vec3::new(eye.cell.x, 0, eye.cell.z),
             frac: Vec3::new(eye.frac.x, 0.0, eye.frac.z),
@@ -349,29 +428,52 @@ impl Landscape {
             }
             Ok((cell, frac))
         };
-        let (terrain_cell, terrain_frac) = place("TERRAIN_SCALE")?;
-        let (rock_cell, rock_frac) = place("ROCK_SCALE")?;
-        // Period and wavelength differ by a power of two, so that the cell and the fraction give the turn exactly.
-        // The key's domain is [1, 12], so that a cell takes 20 to 31 of a turn's 32 bits.
-        let (cloud_cell, cloud_frac) = place("CLOUD_SCALE")?;
-        let bits = 32_u32.wrapping_sub(number("CLOUD_PERIOD_DOUBLINGS") as u32);
-        let cell = f64::from(1_u32.wrapping_shl(bits));
-        let cloud_turn = [0, 1, 2].map(|axis| {
-            let within = (f64::from(cloud_frac[axis]) * cell) as u32;
-            let whole = cloud_cell[axis].cast_unsigned().wrapping_shl(bits);
-            whole.wrapping_add(within)
-        });
-        Ok(Anchors {
-            terrain_cell: [terrain_cell[0], terrain_cell[2]],
-            terrain_frac: [terrain_frac[0], terrain_frac[2]],
-            rock_cell,
-            rock_frac,
-            cloud_turn,
-            ..Default::default()
-        })
+        let cell = |name: &str| Ok::<_, Error>(place(name)?.0.map(i32::to_le_bytes));
+        let frac = |name: &str| Ok::<_, Error>(place(name)?.1.map(f32::to_le_bytes));
+        let flat = |[x, _, z]: [[u8; 4]; 3]| vec![x, z];
+        let mut bytes = vec![0; layout.size as usize];
+        for member in layout.members.iter() {
+            let words = match member.name.as_ref() {
+                "terrain_cell" => flat(cell("TERRAIN_SCALE")?),
+                "terrain_frac" => flat(frac("TERRAIN_SCALE")?),
+                "rock_cell" => cell("ROCK_SCALE")?.to_vec(),
+                "rock_frac" => frac("ROCK_SCALE")?.to_vec(),
+                "cloud_turn" => {
+                    let (cell, frac) = place("CLOUD_SCALE")?;
+                    // Period and wavelength differ by a power of two, so that the cell and the fraction give the turn
+                    // exactly. The key's domain is [1, 12], so that a cell takes 20 to 31 of a turn's 32 bits.
+                    let bits = 32_u32.wrapping_sub(number("CLOUD_PERIOD_DOUBLINGS") as u32);
+                    let size = f64::from(1_u32.wrapping_shl(bits));
+                    let turn = |axis: usize| {
+                        let within = (f64::from(frac[axis]) * size) as u32;
+                        let whole = cell[axis].cast_unsigned().wrapping_shl(bits);
+                        whole.wrapping_add(within).to_le_bytes()
+                    };
+                    [0, 1, 2].map(turn).to_vec()
+                }
+                other => {
+                    return Err(Error::UnknownKey {
+                        name: other.to_owned(),
+                        nearest: None,
+                    });
+                }
+            };
+            let words = words.concat();
+            let at = member.offset as usize;
+            bytes
+                .get_mut(at..at + words.len())
+                .ok_or_else(|| Error::WrongType {
+                    name: member.name.to_string(),
+                    value: format!("{} bytes", words.len()),
+                    expected: member.ty.to_string(),
+                })?
+                .copy_from_slice(&words);
+        }
+        Ok(bytes)
     }
 
-    /// Uploads what has changed since the last call.
+    /// Uploads what has changed since the last call: each block of parameters whose bytes are others, nothing for a view,
+    /// frame number and content as they were.
     ///
     /// Nothing is submitted; `encoder` is the one that the pass of [`Landscape::composite`] is recorded in.
     ///
@@ -386,6 +488,9 @@ impl Landscape {
     ) -> Result<Work, Error> {
         // The textbook picture has no tables, so that nothing is recorded ahead of the pass.
         let _ = (device, encoder);
+        if self.prepared == Some((*view, self.frame)) {
+            return Ok(Work::default());
+        }
         view.check()?;
         let altitude = view.eye.altitude();
         if !(-1e4..=1e8).contains(&altitude) {
@@ -409,18 +514,23 @@ impl Landscape {
             jitter: view.jitter.to_array(),
             ..Default::default()
         };
-        let content = self
-            .settings
-            .uniform_bytes(&self.programs, &self.content_layout)?;
-        let anchors = self.anchors(view.eye)?;
-        let [view_block, content_block, anchor_block] = &mut self.blocks;
-        let bytes = view_block.update(queue, &block.to_bytes())
-            + content_block.update(queue, &content)
-            + anchor_block.update(queue, &anchors.to_bytes());
-        Ok(Work {
-            bytes,
-            ..Default::default()
-        })
+        let contents = self
+            .blocks
+            .iter()
+            .map(|b| match &b.holds {
+                Holds::View => Ok(block.to_bytes().to_vec()),
+                Holds::Content(layout) => self.settings.uniform_bytes(&self.programs, layout),
+                Holds::Anchors(layout) => self.anchors(layout, view.eye),
+            })
+            .collect::<Result<Vec<_>, Error>>()?;
+        let mut work = Work::default();
+        for (block, bytes) in self.blocks.iter_mut().zip(contents) {
+            let done = block.update(queue, bytes);
+            work.writes += done.writes;
+            work.bytes += done.bytes;
+        }
+        self.prepared = Some((*view, self.frame));
+        Ok(work)
     }
 
     /// Sets the number that seeds the step jitter; give each frame its own to make the noise change.

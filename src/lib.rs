@@ -26,7 +26,7 @@ pub mod programs {
 
 pub use error::Error;
 pub use glam;
-pub use landscape::{Landscape, LandscapeOptions, Targets, Work};
+pub use landscape::{Landscape, LandscapeOptions, Resources, Targets, Work};
 pub use program::{ComposedProgram, ProgramSet, Value};
 pub use programs::programs;
 pub use settings::{Preset, Settings};

@@ -72,6 +72,12 @@ pub enum CliError {
         /// What exists instead; may be empty.
         hint: String,
     },
+    /// A process that measures has failed.
+    #[error("measuring in a process of its own failed: {what}")]
+    Child {
+        /// What it said.
+        what: String,
+    },
     /// `veduta lint` has found faults; they have been printed.
     #[error("{count} fault{} found", if *.count == 1 { "" } else { "s" })]
     Lint {

@@ -5,6 +5,7 @@ pub mod bench;
 pub mod camera;
 pub mod catalog;
 pub mod commands;
+pub mod cost;
 pub mod cpu;
 pub mod error;
 pub mod image;

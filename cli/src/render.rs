@@ -138,6 +138,7 @@ pub struct Renderer {
     size: Size,
     output: Output,
     pipeline_time: Duration,
+    pipeline_cpu_ms: Option<f64>,
     timer: Option<Timer>,
 }
 
@@ -179,7 +180,10 @@ impl Timer {
 }
 
 /// Runs `work` and turns the device's complaints into an error instead of a panic.
-fn guarded<T>(gpu: &Gpu, work: impl FnOnce() -> Result<T, CliError>) -> Result<T, CliError> {
+pub(crate) fn guarded<T>(
+    gpu: &Gpu,
+    work: impl FnOnce() -> Result<T, CliError>,
+) -> Result<T, CliError> {
     let memory = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
     let validation = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
     let outcome = work();
@@ -226,6 +230,7 @@ impl Renderer {
                 color_format: output.format(),
                 ..Targets::default()
             };
+            let cpu = CpuTime::now();
             let start = Instant::now();
             let landscape = Landscape::new(&gpu.device, programs, &targets, options)?;
             Ok(Renderer {
@@ -236,6 +241,7 @@ impl Renderer {
                 size,
                 output,
                 pipeline_time: start.elapsed(),
+                pipeline_cpu_ms: since(cpu.as_ref()),
                 timer: None,
             })
         })
@@ -254,6 +260,11 @@ impl Renderer {
     /// How long [`Landscape::new`] took.
     pub fn pipeline_time(&self) -> Duration {
         self.pipeline_time
+    }
+
+    /// Processor milliseconds of [`Landscape::new`], driver threads included; `None` where the system does not tell.
+    pub fn pipeline_cpu_ms(&self) -> Option<f64> {
+        self.pipeline_cpu_ms
     }
 
     /// Turns the device's timestamps on or off; they are off at first.

@@ -179,7 +179,8 @@ impl<F: Fn([f64; 3]) -> f64> Volume<F> {
         phase_double_henyey_greenstein(mu, self.g_forward, self.g_backward, self.backward_share)
     }
 
-    /// Optical depth from a point to the sun with its error, to the absolute `tolerance`; infinite behind the planet.
+    /// Optical depth from a point to the sun with its error; infinite behind the planet. The `tolerance` is absolute up to a
+    /// depth of 1 and relative above, where little light is left.
     pub fn sun_depth(&self, point: [f64; 3], to_sun: [f64; 3], tolerance: f64) -> (f64, f64) {
         if self.region.ground(point, to_sun).is_some() {
             return (f64::INFINITY, 0.0);
@@ -188,7 +189,7 @@ impl<F: Fn([f64; 3]) -> f64> Volume<F> {
             |t| [self.extinction_at(add(point, scale(to_sun, t)))],
             &self.region.stretches(point, to_sun, f64::INFINITY),
             Tolerance {
-                relative: 0.0,
+                relative: tolerance,
                 absolute: tolerance,
                 panels: 500,
             },
@@ -220,7 +221,7 @@ impl<F: Fn([f64; 3]) -> f64> Volume<F> {
 
     /// Light scattered once on a view ray: composite Gauss-Legendre with `panels` panels of `order` points on each stretch
     /// inside the region. The error falls with the power of twice the order where the density is smooth; `error` holds
-    /// only the part of the depths towards the sun, which are adaptive to the absolute `tolerance`.
+    /// only the part of the depths towards the sun, which are adaptive to the `tolerance` (see [`Volume::sun_depth`]).
     pub fn single_scatter_composite(
         &self,
         ray: &VolumeRay,

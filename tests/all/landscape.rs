@@ -6,8 +6,8 @@ use veduta::glam::{DVec3, I64Vec3, Vec3};
 use veduta::program::{KeyKind, StageKind};
 use veduta::view::direction;
 use veduta::{
-    Error, Landscape, LandscapeOptions, Light, Preset, Settings, Targets, Value, View, WorldPos,
-    programs,
+    Error, Landscape, LandscapeOptions, Light, Preset, Settings, Targets, Value, View, Work,
+    WorldPos, programs,
 };
 
 const HDR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
@@ -659,26 +659,350 @@ fn nested(dir: vec3<f32>) -> f32 {
 #[test]
 fn a_still_frame_uploads_nothing_and_content_makes_no_pipeline() {
     let gpu = gpu();
-    let mut land = landscape("thesis_low", "thesis", &[]);
-    let view = frozen("V01", 0.0);
+    let mut land = landscape("thesis_skip", "thesis", &[]);
+    let mut view = frozen("V01", 0.0);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let mut prepare = |land: &mut Landscape, view: &View| {
         land.prepare(&gpu.device, &gpu.queue, &mut encoder, view)
             .unwrap()
     };
-    let first = prepare(&mut land, &view);
-    assert!(first.bytes > 0 && first.bakes == 0 && first.dispatches == 0 && first.draws == 0);
-    assert_eq!(prepare(&mut land, &view).bytes, 0);
+    let written = |writes: u32, bytes: u64| Work {
+        writes,
+        bytes,
+        ..Default::default()
+    };
+    let program = programs()
+        .get("landscape", &["TERRAIN", "ATMOSPHERE", "CLOUDS"])
+        .unwrap();
+    let [of_view, of_content, of_anchors] =
+        ["View", "Content", "Anchors"].map(|n| u64::from(program.layout(n).unwrap().size));
+    let all = written(3, of_view + of_content + of_anchors);
+    assert_eq!(land.resources().buffer_bytes, all.bytes);
+    assert_eq!(prepare(&mut land, &view), all);
+    assert_eq!(prepare(&mut land, &view), Work::default());
+    // Time alone moves nothing.
+    view.time += 1.0;
+    assert_eq!(prepare(&mut land, &view), Work::default());
+    // Each change writes the block that it concerns, once.
+    let mut change = |land: &mut Landscape, view: &View, bytes: u64, what: &str| {
+        assert_eq!(prepare(land, view), written(1, bytes), "{what}");
+        assert_eq!(prepare(land, view), Work::default(), "{what}, again");
+    };
+    view.exposure = 2.0;
+    change(&mut land, &view, of_view, "exposure");
+    view.sun.to_light = direction(0.1, 1.0).as_vec3();
+    change(&mut land, &view, of_view, "sun");
+    land.set_frame(7);
+    change(&mut land, &view, of_view, "frame");
+    view.eye = view.eye.moved_by(DVec3::new(0.0, 10.0, 0.0));
+    change(&mut land, &view, of_view, "altitude");
+    view.eye = view.eye.moved_by(DVec3::new(10.0, 0.0, 0.0));
+    change(&mut land, &view, of_anchors, "place");
     let before = land.pipeline().clone();
+    let resources = land.resources();
     land.set_content("CLOUD_COVERAGE", Value::Float(0.9))
         .unwrap();
     land.set_content("TERRAIN_HEIGHT", Value::Float(500.0))
         .unwrap();
-    let work = prepare(&mut land, &view);
-    assert!(work.bytes > 0 && work.bytes < 1024);
+    change(&mut land, &view, of_content, "content");
+    land.set_content("CLOUD_COVERAGE", Value::Float(0.9))
+        .unwrap();
+    assert_eq!(prepare(&mut land, &view), Work::default(), "the same value");
+    land.set_content("CLOUD_SCALE", Value::Float(2000.0))
+        .unwrap();
+    assert_eq!(
+        prepare(&mut land, &view),
+        written(2, of_content + of_anchors),
+        "a wavelength, on which the lattice depends"
+    );
     assert_eq!(&before, land.pipeline(), "content made a new pipeline");
+    assert_eq!(resources, land.resources(), "content made new resources");
     let refused = land.set_content("CLOUD_STEPS", Value::Int(3)).unwrap_err();
     assert!(refused.to_string().contains("a quality key"), "{refused}");
+    // Another format needs another landscape, which owes nothing to the first.
+    let options = LandscapeOptions {
+        preset: Preset::ThesisSkip,
+        ..Default::default()
+    };
+    let format = wgpu::TextureFormat::Rgba8Unorm;
+    let mut other = Landscape::new(&gpu.device, programs(), &targets(format), &options).unwrap();
+    assert_ne!(&before, other.pipeline());
+    assert_eq!(prepare(&mut other, &view), all);
+}
+
+/// What was left unwritten was there already: views in any order give the pictures of a landscape that has seen no other.
+#[test]
+fn a_view_that_comes_back_gives_the_same_picture() {
+    let mut land = landscape("thesis_low", "thesis", &[]);
+    let pictures = ["V01", "V01", "V03", "V01", "V03"].map(|name| {
+        let picture = draw(&mut land, &frozen(name, 0.0), SMALL, HDR);
+        let mut fresh = landscape("thesis_low", "thesis", &[]);
+        let expected = draw(&mut fresh, &frozen(name, 0.0), SMALL, HDR);
+        assert!(picture.pixels == expected.pixels, "{name}");
+        picture
+    });
+    assert!(difference(&pictures[0], &pictures[2]) > 1e-3);
+}
+
+/// The features that a scene can name, and what only they bring: a word that the others' texts do not hold, and modules.
+const FEATURES: [(&str, &[&str], &[&str]); 3] = [
+    (
+        "TERRAIN",
+        &["terrain", "ridge", "snow", "rock_light", "soft_shadow"],
+        &["height", "march", "material", "normal", "shadow"],
+    ),
+    (
+        "ATMOSPHERE",
+        &["atmos", "rayleigh", "mie_", "march_sky", "sun_disc"],
+        &["march", "sun_disc"],
+    ),
+    ("CLOUDS", &["cloud"], &["composite", "field", "march"]),
+];
+
+/// Every set of features, with and without LOW_QUALITY.
+fn feature_sets() -> Vec<Vec<&'static str>> {
+    (0..16)
+        .map(|bits| {
+            let names = FEATURES.iter().map(|f| f.0).chain(["LOW_QUALITY"]);
+            names
+                .enumerate()
+                .filter(|(i, _)| bits >> i & 1 == 1)
+                .map(|(_, name)| name)
+                .collect()
+        })
+        .collect()
+}
+
+/// Whether a set draws a feature: clouds are not drawn in low quality.
+fn draws(set: &[&str], feature: &str) -> bool {
+    set.contains(&feature) && !(feature == "CLOUDS" && set.contains(&"LOW_QUALITY"))
+}
+
+/// The text without what stands under flags that are off, and without any flag: written apart from the composer.
+fn stripped(text: &str, on: &[&str]) -> String {
+    let mut open: Vec<bool> = Vec::new();
+    let mut kept = String::new();
+    for line in text.lines() {
+        let word = line.trim();
+        if let Some(flag) = word.strip_prefix("#ifdef ") {
+            open.push(on.contains(&flag));
+        } else if let Some(flag) = word.strip_prefix("#ifndef ") {
+            open.push(!on.contains(&flag));
+        } else if word == "#else" {
+            let last = open.last_mut().unwrap();
+            *last = !*last;
+        } else if word == "#endif" {
+            open.pop().unwrap();
+        } else if open.iter().all(|o| *o) {
+            kept += line;
+            kept.push('\n');
+        }
+    }
+    assert!(open.is_empty());
+    kept
+}
+
+#[test]
+fn a_feature_that_is_not_named_adds_no_byte() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let source = Source::read(&[&root.join("wgsl"), &root.join("presets")]).unwrap();
+    let text = std::fs::read_to_string(root.join("wgsl/programs/landscape.sp")).unwrap();
+    let mut texts = std::collections::BTreeMap::new();
+    for set in feature_sets() {
+        let name = if set.is_empty() {
+            "NOTHING".to_owned()
+        } else {
+            set.join("_")
+        };
+        let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"))
+            .join("stripped")
+            .join(name);
+        let _ = std::fs::remove_dir_all(&folder);
+        copy(&root.join("wgsl"), &folder);
+        std::fs::copy(root.join("presets/keys.ron"), folder.join("keys.ron")).unwrap();
+        // The program as somebody would write it who has never heard of the other features, nor has their modules.
+        let bare = stripped(&text, &set);
+        assert!(!bare.contains("#if") && !bare.contains("#else"));
+        std::fs::write(folder.join("programs/landscape.sp"), &bare).unwrap();
+        for (feature, _, modules) in FEATURES {
+            for module in modules.iter().filter(|_| !draws(&set, feature)) {
+                let file = format!("{}/{module}.wgsl", feature.to_lowercase());
+                std::fs::remove_file(folder.join(file)).unwrap();
+            }
+        }
+        let by_hand = Source::read(&[&folder])
+            .unwrap()
+            .compose("landscape", &[])
+            .unwrap();
+        let by_flags = source.compose("landscape", &set).unwrap();
+        assert!(
+            by_hand.stages == by_flags.stages,
+            "{set:?}: the texts differ"
+        );
+        assert_eq!(by_hand.bindings, by_flags.bindings, "{set:?}");
+        assert_eq!(by_hand.overrides, by_flags.overrides, "{set:?}");
+        assert_eq!(by_hand.structs, by_flags.structs, "{set:?}");
+        // Neither is there a word of it.
+        let whole: String = by_flags
+            .stages
+            .iter()
+            .map(|s| s.wgsl.to_lowercase())
+            .collect();
+        for (feature, words, _) in FEATURES {
+            for word in words {
+                assert_eq!(
+                    whole.contains(word),
+                    draws(&set, feature),
+                    "{set:?}: {word}"
+                );
+            }
+        }
+        // What is drawn decides on the text, and all of it.
+        let drawn = FEATURES.map(|f| draws(&set, f.0));
+        assert_eq!(texts.entry(drawn).or_insert(whole.clone()), &whole);
+    }
+    let distinct: std::collections::BTreeSet<_> = texts.values().collect();
+    assert_eq!((texts.len(), distinct.len()), (8, 8));
+}
+
+fn copy(from: &std::path::Path, to: &std::path::Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let target = to.join(path.file_name().unwrap());
+        if path.is_dir() {
+            copy(&path, &target);
+        } else {
+            std::fs::copy(&path, &target).unwrap();
+        }
+    }
+}
+
+/// The landscape's account of what it keeps, against `wgpu`'s own.
+#[test]
+fn a_feature_that_is_not_named_allocates_nothing() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let source = Source::read(&[&root.join("wgsl"), &root.join("presets")]).unwrap();
+    let mut set = programs().clone();
+    // An instance of our own: other tests run beside.
+    let instance =
+        wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default())).unwrap();
+    let (device, queue) = pollster::block_on(adapter.request_device(&Default::default())).unwrap();
+    let count = || {
+        let hub = instance.generate_report().unwrap().hub;
+        [
+            hub.render_pipelines,
+            hub.compute_pipelines,
+            hub.bind_groups,
+            hub.buffers,
+            hub.textures,
+            hub.texture_views,
+            hub.samplers,
+            hub.query_sets,
+        ]
+        .map(|r| r.num_allocated as u32)
+    };
+    let view = frozen("V01", 0.0);
+    for features in feature_sets() {
+        let program = set.get_or_compose(&source, "landscape", &features).unwrap();
+        let bindings = program.bindings.len() as u32;
+        let size = |name: &str| program.layout(name).map_or(0, |l| u64::from(l.size));
+        let bytes = size("View") + size("Content") + size("Anchors");
+        let flags = FEATURES.iter().map(|f| f.0).chain(["LOW_QUALITY"]);
+        let options = LandscapeOptions {
+            values: flags
+                .map(|f| (f.to_owned(), Value::Flag(features.contains(&f))))
+                .collect(),
+            ..Default::default()
+        };
+        let before = count();
+        let mut land = Landscape::new(&device, &set, &targets(HDR), &options).unwrap();
+        let after = count();
+        let made: Vec<u32> = after.iter().zip(before).map(|(a, b)| a - b).collect();
+        let kept = land.resources();
+        assert_eq!(
+            made,
+            [
+                kept.pipelines,
+                0,
+                kept.bind_groups,
+                kept.buffers,
+                kept.textures,
+                0,
+                kept.samplers,
+                0
+            ],
+            "{features:?}"
+        );
+        // One block for the view, one for content, and a third for the lattices of terrain and clouds.
+        let lattices = draws(&features, "TERRAIN") || draws(&features, "CLOUDS");
+        assert_eq!(kept.bindings, 2 + u32::from(lattices), "{features:?}");
+        assert_eq!((kept.bindings, kept.buffers), (bindings, bindings));
+        assert_eq!(kept.buffer_bytes, bytes, "{features:?}");
+        assert_eq!((kept.textures, kept.texture_bytes), (0, 0));
+        let mut encoder = device.create_command_encoder(&Default::default());
+        for expected in [bindings, 0] {
+            let work = land.prepare(&device, &queue, &mut encoder, &view).unwrap();
+            assert_eq!(work.writes, expected);
+            assert_eq!((work.bakes, work.dispatches, work.draws), (0, 0, 0));
+        }
+        // Content that the program does not have is not uploaded either.
+        for (feature, key) in [
+            ("TERRAIN", "TERRAIN_HEIGHT"),
+            ("ATMOSPHERE", "MIE_HEIGHT"),
+            ("CLOUDS", "CLOUD_DENSITY"),
+        ] {
+            land.set_content(key, Value::Float(900.0)).unwrap();
+            let work = land.prepare(&device, &queue, &mut encoder, &view).unwrap();
+            assert_eq!(work.writes, u32::from(draws(&features, feature)), "{key}");
+        }
+        assert_eq!(count(), after, "{features:?}: `prepare` made something");
+    }
+}
+
+#[test]
+fn a_feature_that_is_not_named_does_no_work() {
+    let view = frozen("V01", 0.0);
+    let on = ("COUNT_OPERATIONS", Value::Flag(true));
+    let counts = |set: &[&str]| {
+        let mut values = vec![on, ("CLOUD_STEPS", Value::Int(8))];
+        let flags = FEATURES.iter().map(|f| f.0).chain(["LOW_QUALITY"]);
+        values.extend(flags.map(|f| (f, Value::Flag(set.contains(&f)))));
+        let mut land = landscape("thesis", "thesis", &values);
+        draw(&mut land, &view, SMALL, HDR).pixels
+    };
+    let with = |feature: &str, pixels: &[[f32; 4]]| {
+        let some = |channel: usize| pixels.iter().any(|p| p[channel] > 0.0);
+        match feature {
+            "TERRAIN" => some(0),
+            "ATMOSPHERE" => some(3),
+            _ => some(1) && some(2),
+        }
+    };
+    let all = feature_sets().into_iter().map(|set| (counts(&set), set));
+    let all: Vec<(Vec<[f32; 4]>, Vec<&str>)> = all.collect();
+    for (pixels, set) in &all {
+        for feature in ["ATMOSPHERE", "CLOUDS"] {
+            assert_eq!(
+                with(feature, pixels),
+                draws(set, feature),
+                "{set:?}: {feature}"
+            );
+        }
+        // Noise is evaluated by terrain and clouds, and by nothing else.
+        let noisy = draws(set, "TERRAIN") || draws(set, "CLOUDS");
+        assert_eq!(with("TERRAIN", pixels), noisy, "{set:?}");
+    }
+    // Without clouds the terrain costs what it costs with them, to the evaluation.
+    let of = |set: &[&str]| &all.iter().find(|(_, s)| s == set).unwrap().0;
+    let (clear, cloudy) = (
+        of(&["TERRAIN", "ATMOSPHERE"]),
+        of(&["TERRAIN", "ATMOSPHERE", "CLOUDS"]),
+    );
+    for (a, b) in clear.iter().zip(cloudy) {
+        assert_eq!(a[0], b[0] - 6.0 * (b[1] + b[2]));
+    }
 }
 
 #[test]

@@ -33,7 +33,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::tone_map::exponential::{exponential}
 #import veduta::post::srgb::{encode_srgb, decode_srgb}
 #import veduta::post::dither::{dither}
-#import veduta::planet::shell::{ground_distance, up_at, direction_cosine_along}
+#import veduta::planet::shell::{ground_distance, up_at}
 #import veduta::terrain::shading::{ThreeLights, shade_three_lights}
 #ifdef ATMOSPHERE
 #import veduta::atmosphere::march::{Atmosphere, march_sky, sun_transmittance}
@@ -64,7 +64,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #endif
 #ifdef CLOUDS
 #ifndef LOW_QUALITY
-#import veduta::planet::shell::{shell_segment, clip_segment, segment_length}
+#import veduta::planet::shell::{shell_segment, clip_segment, segment_length, direction_cosine_along}
 #import veduta::clouds::field::{CloudLayer}
 #ifdef ATMOSPHERE
 #import veduta::clouds::composite::{composite_clouds}
@@ -95,33 +95,48 @@ struct View {
     jitter: vec2<f32>,
 }
 
-// Every member is the content key of the same name.
+// Every member is the content key of the same name. What a feature alone reads stands under its flag; where all are on,
+// vectors are followed by numbers that fill their fourth place.
 struct Content {
     sun_light: vec3<f32>,
     planet_radius: f32,
     sky_light: vec3<f32>,
+#ifdef TERRAIN
     terrain_height: f32,
+#endif
     bounce_light: vec3<f32>,
+#ifdef TERRAIN
     terrain_scale: f32,
+#endif
     rock_dark: vec3<f32>,
+#ifdef TERRAIN
     terrain_hurst: f32,
     rock_light: vec3<f32>,
     terrain_gain: f32,
     snow_albedo: vec3<f32>,
     ridge_smoothness: f32,
+#endif
+#ifdef ATMOSPHERE
     rayleigh_scattering: vec3<f32>,
     rayleigh_height: f32,
+#endif
+#ifdef TERRAIN
     terrain_seed: u32,
     shadow_softness: f32,
     rock_scale: f32,
     snow_edge_low: f32,
     snow_edge_high: f32,
     snow_noise: f32,
+#endif
+#ifdef ATMOSPHERE
     atmosphere_height: f32,
     mie_scattering: f32,
     mie_extinction: f32,
     mie_height: f32,
     mie_g: f32,
+#endif
+#ifdef CLOUDS
+#ifndef LOW_QUALITY
     clouds_height: f32,
     clouds_thickness: f32,
     cloud_coverage: f32,
@@ -134,21 +149,40 @@ struct Content {
     cloud_g_backward: f32,
     cloud_backward_share: f32,
     cloud_seed: u32,
+#endif
+#endif
 }
 
-// Where the eye's foot point lies on each lattice.
+@group(0) @binding(0) var<uniform> view: View;
+@group(1) @binding(0) var<uniform> content: Content;
+
+// Where the eye's foot point lies on each lattice that there is; without any there is no block.
+#ifdef TERRAIN
 struct Anchors {
     terrain_cell: vec2<i32>,
     terrain_frac: vec2<f32>,
     rock_cell: vec3<i32>,
     rock_frac: vec3<f32>,
+#ifdef CLOUDS
+#ifndef LOW_QUALITY
     // In turns of 2^32.
+    cloud_turn: vec3<u32>,
+#endif
+#endif
+}
+
+@group(1) @binding(1) var<uniform> anchors: Anchors;
+#else
+#ifdef CLOUDS
+#ifndef LOW_QUALITY
+struct Anchors {
     cloud_turn: vec3<u32>,
 }
 
-@group(0) @binding(0) var<uniform> view: View;
-@group(1) @binding(0) var<uniform> content: Content;
 @group(1) @binding(1) var<uniform> anchors: Anchors;
+#endif
+#endif
+#endif
 
 override OUTPUT: i32 = 0;
 #ifdef TERRAIN

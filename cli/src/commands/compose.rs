@@ -129,7 +129,7 @@ pub fn run(args: &ComposeArgs) -> Result<(), CliError> {
         Linker::with_capabilities(&Library::default(), claimed(&args.claim)).capabilities();
     let mut texts: Vec<(String, Vec<u8>)> = Vec::new();
     for stage in wanted {
-        let wgsl = with_values(&stage.wgsl, &composed, &settings);
+        let wgsl = with_values(&stage.wgsl, &values(&composed, &settings));
         let written = write_target(&wgsl, args.target.writer(), capabilities)
             .map_err(veduta::Error::Compose)?;
         let name = format!(
@@ -246,9 +246,9 @@ pub fn compose(args: &ComposeArgs) -> Result<(Composed, Settings), CliError> {
     Ok((composed, settings))
 }
 
-/// The text with the resolved values as defaults of its overrides.
-fn with_values(wgsl: &str, composed: &Composed, settings: &Settings) -> String {
-    let values: BTreeMap<&str, String> = composed
+/// The resolved values of overrides by their names, as WGSL.
+fn values<'a>(composed: &'a Composed, settings: &Settings) -> BTreeMap<&'a str, String> {
+    composed
         .overrides
         .iter()
         .filter_map(|item| {
@@ -263,7 +263,11 @@ fn with_values(wgsl: &str, composed: &Composed, settings: &Settings) -> String {
             };
             Some((item.name.as_str(), value))
         })
-        .collect();
+        .collect()
+}
+
+/// The text with these values as defaults of its overrides.
+pub(crate) fn with_values(wgsl: &str, values: &BTreeMap<&str, String>) -> String {
     let mut text = String::with_capacity(wgsl.len());
     for line in wgsl.split_inclusive('\n') {
         // One declaration a line, as the writer has it: `override NAME: TYPE = VALUE;`.

@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod compose;
+pub mod cost;
 pub mod eval;
 pub mod lint;
 pub mod list;

@@ -412,11 +412,24 @@ impl Job {
         size: Size,
         time: f64,
     ) -> Result<[(f64, f64); 4], CliError> {
+        self.operation_counts_at(gpu, size, &self.view(time, size)?)
+    }
+
+    /// [`Job::operation_counts`] as any view sees it.
+    ///
+    /// # Errors
+    /// Faults of composing and of the device.
+    pub fn operation_counts_at(
+        &self,
+        gpu: &Gpu,
+        size: Size,
+        view: &veduta::View,
+    ) -> Result<[(f64, f64); 4], CliError> {
         Ok(operation_counts(&self.measured(
             "COUNT_OPERATIONS",
             gpu,
             size,
-            time,
+            view,
         )?))
     }
 
@@ -426,12 +439,18 @@ impl Job {
     /// # Errors
     /// Faults of composing and of the device.
     pub fn distances(&self, gpu: &Gpu, size: Size, time: f64) -> Result<Vec<f64>, CliError> {
-        let rgba = self.measured("SHOW_DISTANCE", gpu, size, time)?;
+        let rgba = self.measured("SHOW_DISTANCE", gpu, size, &self.view(time, size)?)?;
         Ok(rgba.iter().step_by(4).map(|d| f64::from(*d)).collect())
     }
 
     /// What the variant with a flag that replaces the picture by numbers draws.
-    fn measured(&self, flag: &str, gpu: &Gpu, size: Size, time: f64) -> Result<Vec<f32>, CliError> {
+    fn measured(
+        &self,
+        flag: &str,
+        gpu: &Gpu,
+        size: Size,
+        view: &veduta::View,
+    ) -> Result<Vec<f32>, CliError> {
         let mut job = self.clone();
         job.options
             .values
@@ -442,7 +461,7 @@ impl Job {
         job.catalog.ensure(&program, &job.settings)?;
         let mut renderer =
             Renderer::new(gpu, job.catalog.set(), &job.options, size, Output::Linear)?;
-        renderer.draw(&job.view(time, size)?, Tiling::Adaptive, &mut |_| {})?;
+        renderer.draw(view, Tiling::Adaptive, &mut |_| {})?;
         renderer.read_rgba32()
     }
 }

@@ -4,6 +4,7 @@ mod bench;
 mod ci_job;
 mod common;
 mod compose;
+mod cost;
 mod eval;
 mod frozen;
 mod lint;

@@ -6,7 +6,7 @@ use crate::common::{folder, veduta};
 fn help_names_every_command() {
     let dir = folder("help");
     let help = veduta(&dir, &["--help"]).good().out;
-    for command in ["render", "compose", "lint", "list", "eval"] {
+    for command in ["render", "compose", "lint", "list", "bench", "cost", "eval"] {
         assert!(help.contains(command), "{help}");
         assert!(!veduta(&dir, &[command, "--help"]).good().out.is_empty());
     }
