@@ -253,7 +253,15 @@ pub fn run(
     Ok(Report {
         entries,
         pictures,
-        reference: format!("{}, {} rays a pixel", values.join(" "), samples * samples),
+        reference: format!(
+            "{}, {} a pixel",
+            values.join(" "),
+            if samples == 1 {
+                "1 ray".to_owned()
+            } else {
+                format!("{} rays", samples * samples)
+            }
+        ),
         truth,
     })
 }

@@ -50,6 +50,11 @@ impl Bench {
         args.scene = scene.to_owned();
         args.preset = Some(preset.to_owned());
         args.view = Some(view.to_owned());
+        // What the measurement itself sets goes before the base's values.
+        args.sets.retain(|set| {
+            let key = set.split('=').next().unwrap_or("").trim();
+            values.iter().all(|(name, _)| *name != key)
+        });
         args.sets
             .extend(values.iter().map(|(key, value)| format!("{key}={value}")));
         Job::new(&args)

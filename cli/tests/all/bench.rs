@@ -122,7 +122,7 @@ fn every_effect_has_a_converged_picture() {
         }
         if let [Some(few), Some(many)] = [0, 1].map(|k| report.entries[k].to_truth) {
             println!("8 and 16 steps are {few:.5} and {many:.5} from the f64 reference");
-            assert!(many < 0.03 && many < 0.5 * few);
+            assert!(many < 0.05 && many < 0.5 * few);
         }
         assert!(report.entries.iter().any(|e| e.on_front));
     }
