@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands;
 
-/// Outdoor landscapes for wgpu: render, compose, lint, list, bench, eval.
+/// Outdoor landscapes for wgpu: render, compose, lint, list, bench, stress, eval.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "veduta", version, about, arg_required_else_help = true)]
 pub struct Args {
@@ -27,6 +27,8 @@ pub enum Command {
     List(commands::list::ListArgs),
     /// Measure run time against error
     Bench(Box<commands::bench::BenchArgs>),
+    /// Try adversarial inputs on every public function and every effect
+    Stress(commands::stress::StressArgs),
     /// Evaluate a WGSL expression over rows of numbers on the device
     Eval(commands::eval::EvalArgs),
 }
@@ -43,6 +45,7 @@ impl Args {
             Command::Lint(args) => commands::lint::run(args),
             Command::List(args) => commands::list::run(args),
             Command::Bench(args) => commands::bench::run(args),
+            Command::Stress(args) => commands::stress::run(args),
             Command::Eval(args) => commands::eval::run(args),
         }
     }

@@ -144,20 +144,28 @@ impl Bench {
 
     /// Device, driver, processor and clock, as lines of a document.
     pub fn machine(&self) -> String {
-        let info: wgpu::AdapterInfo = self.gpu.adapter.get_info();
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
         format!(
-            "- device: {}, {} ({:?}), {} {}\n- processor: {}, {threads} threads\n- clock: {}; pictures {}\n",
-            info.name,
-            info.backend,
-            info.device_type,
-            info.driver,
-            info.driver_info,
-            processor(),
+            "{}- clock: {}; pictures {}\n",
+            device_lines(&self.gpu),
             self.clock.describe(),
             self.size,
         )
     }
+}
+
+/// Device, driver and processor, as lines of a document.
+pub fn device_lines(gpu: &Gpu) -> String {
+    let info: wgpu::AdapterInfo = gpu.adapter.get_info();
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    format!(
+        "- device: {}, {} ({:?}), {} {}\n- processor: {}, {threads} threads\n",
+        info.name,
+        info.backend,
+        info.device_type,
+        info.driver,
+        info.driver_info,
+        processor(),
+    )
 }
 
 /// The processor's name, where the system tells.
