@@ -84,7 +84,15 @@ pub fn sphere_span(ground_radius: f64, level: f64, h: f64, mu: f64) -> Span {
 
 /// Distance to the top of the shell.
 pub fn top_distance(ground_radius: f64, top: f64, h: f64, mu: f64) -> f64 {
-    sphere_span(ground_radius, top, h.min(top), mu).far
+    let h = h.min(top);
+    let span = sphere_span(ground_radius, top, h, mu);
+    // The product of both distances is known, and upwards the far one is a small difference.
+    let product = (h - top) * (2.0 * ground_radius + h + top);
+    if mu > 0.0 {
+        product / span.near
+    } else {
+        span.far
+    }
 }
 
 /// Distance to the ground sphere; -1 when the ray misses it.

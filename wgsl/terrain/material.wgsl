@@ -109,6 +109,7 @@ fn rock_high_filtered(rock: Rock, position: vec3<f32>, dpdx: vec3<f32>, dpdy: ve
 /// domain  normal in [-1, 1] 1 lin
 /// range   [-4e4, 4e4] m
 /// error   0.1 abs of reference::terrain::surface_footprint
+/// outside undefined
 /// source  Igehy1999 ray differentials on the tangent plane; limit: ours
 fn surface_footprint(dir: vec3<f32>, dir_change: vec3<f32>, distance: f32, normal: vec3<f32>) -> vec3<f32> {
     let facing = min(dot(dir, normal), -0.05);

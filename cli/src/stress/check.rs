@@ -95,7 +95,7 @@ pub struct Finding {
 /// The most faults of a kind that are kept.
 const MOST_FAULTS: usize = 3;
 
-/// The largest share of rows whose result may be left out.
+/// The largest share of rows spread over the domain whose result may be left out.
 const MOST_LEFT_OUT: f64 = 0.02;
 
 /// How often a bound may be the largest error in a long run.
@@ -121,6 +121,9 @@ pub struct Work<'a> {
     adversarial: u64,
     sum: f64,
     components: u64,
+    /// Rows spread over the domain, and those of them that were left out.
+    spread: u64,
+    spread_left_out: u64,
     found: Finding,
 }
 
@@ -213,7 +216,7 @@ impl<'a> Work<'a> {
             .prepare
             .iter()
             .map(|p| match p {
-                Prepare::Unit(name) => samples.columns_of(name),
+                Prepare::Unit(name) | Prepare::Whole(name) => samples.columns_of(name),
                 Prepare::Ascending(names) => names
                     .iter()
                     .flat_map(|name| samples.columns_of(name))
@@ -263,6 +266,8 @@ impl<'a> Work<'a> {
             adversarial: 0,
             sum: 0.0,
             components: 0,
+            spread: 0,
+            spread_left_out: 0,
             found: Finding {
                 function: subject.short().to_owned(),
                 bound: header.error.clone(),
@@ -313,6 +318,7 @@ impl<'a> Work<'a> {
                         }
                     }
                 }
+                Prepare::Whole(_) => values.iter_mut().for_each(|v| *v = v.round()),
                 Prepare::Ascending(_) => values.sort_by(f64::total_cmp),
             }
             for (k, value) in columns.iter().zip(values) {
@@ -443,6 +449,7 @@ impl<'a> Work<'a> {
         let Some(error) = &subject.function.header.error else {
             return;
         };
+        self.spread += u64::from(kind == Kind::Random);
         let truth = self.entry.call(row);
         if let Some(align) = self.entry.align {
             align(device, truth.get());
@@ -452,6 +459,7 @@ impl<'a> Work<'a> {
         let worst = if worst.is_nan() { f64::INFINITY } else { worst };
         if worst > error.value && self.undetermined(error, row, device) {
             self.found.left_out += 1;
+            self.spread_left_out += u64::from(kind == Kind::Random);
             return;
         }
         self.sum += sum;
@@ -586,11 +594,13 @@ impl<'a> Work<'a> {
     /// The finding; `long` asks for bounds that are not too generous.
     pub fn finish(mut self, long: bool) -> Finding {
         self.found.mean = self.sum / self.components.max(1) as f64;
-        let inside = self.found.evaluations - self.found.outside;
-        let share = self.found.left_out as f64 / inside.max(1) as f64;
+        let share = self.spread_left_out as f64 / self.spread.max(1) as f64;
         if share > MOST_LEFT_OUT {
             self.fault(Check::Undetermined, || {
-                format!("{:.1} % of the results are not determined", 100.0 * share)
+                format!(
+                    "{:.1} % of the results of random arguments are not determined",
+                    100.0 * share
+                )
             });
         }
         let largest = self.found.largest;

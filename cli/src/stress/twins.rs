@@ -366,6 +366,8 @@ pub enum Prepare {
     Unit(&'static str),
     /// Numbers are put in order, the smallest first.
     Ascending(&'static [&'static str]),
+    /// Numbers are rounded to whole ones.
+    Whole(&'static str),
 }
 
 impl Prepare {
@@ -373,6 +375,7 @@ impl Prepare {
     pub fn describe(&self) -> String {
         match self {
             Prepare::Unit(name) => format!("{name} a unit vector"),
+            Prepare::Whole(name) => format!("{name} whole"),
             Prepare::Ascending(names) => format!("{} ascending", names.join(", ")),
         }
     }
@@ -536,12 +539,12 @@ impl Entry {
 
     fn air(self) -> Entry {
         self.log("atmosphere.ground_radius", 3e6, 1e8)
-            .lin("atmosphere.top", 1e5, 2e5)
+            .lin("atmosphere.top", 1.1e5, 1.2e5)
             .log("atmosphere.rayleigh_scattering", 1e-6, 1e-4)
             .lin("atmosphere.rayleigh_height", 4e3, 1.6e4)
             .log("atmosphere.mie_scattering", 1e-7, 1e-4)
             .log("atmosphere.mie_extinction", 1e-7, 1e-4)
-            .lin("atmosphere.mie_height", 600.0, 4e3)
+            .lin("atmosphere.mie_height", 1400.0, 4e3)
             .lin("atmosphere.mie_g", -0.9, 0.9)
             .ascending(&["atmosphere.mie_scattering", "atmosphere.mie_extinction"])
     }
@@ -1199,7 +1202,11 @@ fn particular(entry: Entry) -> Entry {
             entry.judged(&["cell", "frac"]).align(same_place::<3>)
         }
         ("noise::lattice", "turn_3d") => entry.align(same_turn),
-        ("hash::lattice", "hash_source_2d") => entry.branch("position", &[-3e6, 3e6, 0.0]),
+        ("hash::lattice", "hash_source_2d") => {
+            let mut entry = entry.branch("position", &[-3e6, 3e6, 0.0]);
+            entry.prepare.push(Prepare::Whole("position"));
+            entry
+        }
         ("noise::simplex", _) => entry.weight(if name.contains("3d") { 6.0 } else { 3.0 }),
         ("noise::worley", _) if name.contains("slope") => entry
             .jumps("points as near as others, and the points themselves", 1e-5)
@@ -1309,6 +1316,7 @@ fn particular(entry: Entry) -> Entry {
         ("terrain::march", "ray_clearance") => entry.terrain().unit("dir").weight(20.0),
         ("terrain::march", "march_constant") => entry
             .terrain()
+            .lin("eye_altitude", 0.0, 4000.0)
             .unit("dir")
             .lin("max_steps", 0.0, FEW_STEPS)
             .judged(&["distance"])
@@ -1316,6 +1324,7 @@ fn particular(entry: Entry) -> Entry {
             .weight(500.0),
         ("terrain::march", "march") => entry
             .terrain()
+            .lin("eye_altitude", 0.0, 4000.0)
             .unit("dir")
             .lin("max_steps", 0.0, FEW_STEPS)
             .judged(&["distance"])
@@ -1326,6 +1335,8 @@ fn particular(entry: Entry) -> Entry {
         }
         ("terrain::shadow", _) => entry
             .terrain()
+            .lin("eye_altitude", 0.0, 4000.0)
+            .lin("relative", -3000.0, 3000.0)
             .unit("normal")
             .unit("to_sun")
             .lin("max_steps", 0.0, FEW_STEPS)
@@ -1333,12 +1344,7 @@ fn particular(entry: Entry) -> Entry {
             .jumps("grazing rays, the last step", 1e-6)
             .weight(500.0),
         ("terrain::shading", "bounce_direction") => entry.unit("to_sun").branch("to_sun", &[1e-5]),
-        ("terrain::shading", _) => entry
-            .lin("lights.sun_color", 0.0, 10.0)
-            .lin("lights.sky_color", 0.0, 10.0)
-            .lin("lights.bounce_color", 0.0, 10.0)
-            .unit("normal")
-            .unit("to_sun"),
+        ("terrain::shading", _) => entry.unit("normal").unit("to_sun"),
         ("terrain::material", "rock_low") => entry.rock().weight(10.0),
         ("terrain::material", "rock_high") => entry.rock().weight(40.0),
         ("terrain::material", "rock_low_filtered") => {
