@@ -762,7 +762,14 @@ impl<'a> Lint<'a> {
                         None => rest.text.to_owned(),
                     });
                 }
-                "outside" if rest.text == "undefined" => header.outside_undefined = true,
+                "outside" => {
+                    if rest.text != "undefined" {
+                        self.fault(at, "the form is `outside undefined`");
+                    } else if header.outside_undefined {
+                        self.fault(at, "a second `outside undefined`");
+                    }
+                    header.outside_undefined = true;
+                }
                 "internal" if rest.text.is_empty() => header.internal = true,
                 _ if keyed => self.fault_with(
                     at,

@@ -85,14 +85,11 @@ pub fn sphere_span(ground_radius: f64, level: f64, h: f64, mu: f64) -> Span {
 /// Distance to the top of the shell.
 pub fn top_distance(ground_radius: f64, top: f64, h: f64, mu: f64) -> f64 {
     let h = h.min(top);
-    let span = sphere_span(ground_radius, top, h, mu);
-    // The product of both distances is known, and upwards the far one is a small difference.
-    let product = (h - top) * (2.0 * ground_radius + h + top);
-    if mu > 0.0 {
-        product / span.near
-    } else {
-        span.far
-    }
+    // The roots of t^2 + 2 b t - c = 0; their product is -c, and upwards the far one is a small difference.
+    let b = (ground_radius + h) * mu;
+    let c = (top - h) * (2.0 * ground_radius + top + h);
+    let root = (b * b + c).sqrt();
+    if b > 0.0 { c / (b + root) } else { root - b }
 }
 
 /// Distance to the ground sphere; -1 when the ray misses it.

@@ -74,7 +74,7 @@ fn sun_depth(layer: CloudLayer, ground_radius: f32, relative: vec3<f32>, altitud
 /// domain  light_steps in [1, 64] 1 lin
 /// domain  jitter in [0, 1] 1 lin
 /// range   [0, 100] 1/sr
-/// error   2e-4 abs of reference::clouds::march_clouds
+/// error   3e-4 abs of reference::clouds::march_clouds
 /// outside undefined
 /// source  Leitner2022 ch. 4.5 and eq. 3.14
 fn march_clouds(layer: CloudLayer, ground_radius: f32, eye_altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, max_distance: f32,
@@ -121,7 +121,7 @@ fn march_clouds(layer: CloudLayer, ground_radius: f32, eye_altitude: f32, dir: v
 /// domain  min_transmittance in [0, 0.1] 1 lin
 /// domain  jitter in [0, 1] 1 lin
 /// range   [0, 100] 1/sr
-/// error   2e-4 abs of reference::clouds::march_clouds
+/// error   3e-4 abs of reference::clouds::march_clouds
 /// outside undefined
 /// source  Leitner2022 ch. 4.5 and eq. 3.14; skipping: ours
 fn march_clouds_skip(layer: CloudLayer, ground_radius: f32, eye_altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, max_distance: f32,

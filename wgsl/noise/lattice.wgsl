@@ -313,7 +313,7 @@ fn turn_3d(turns: vec3<f32>) -> vec3<u32> {
 ///
 /// domain  t in [0, 1] 1 lin
 /// range   [-2e-7, 1.875] 1
-/// error   3e-7 abs of reference::noise::fade_slope
+/// error   4e-7 abs of reference::noise::fade_slope
 /// outside undefined
 /// source  Perlin2002
 fn fade_slope_2d(t: vec2<f32>) -> vec2<f32> {
@@ -326,7 +326,7 @@ fn fade_slope_2d(t: vec2<f32>) -> vec2<f32> {
 ///
 /// domain  t in [0, 1] 1 lin
 /// range   [-2e-7, 1.875] 1
-/// error   3e-7 abs of reference::noise::fade_slope
+/// error   4e-7 abs of reference::noise::fade_slope
 /// outside undefined
 /// source  Perlin2002
 fn fade_slope_3d(t: vec3<f32>) -> vec3<f32> {

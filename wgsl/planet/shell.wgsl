@@ -193,7 +193,7 @@ fn clip_segment(segment: ShellSegment, max_distance: f32) -> ShellSegment {
 /// Length of a segment without its gap.
 ///
 /// range   [0, 1e7] m
-/// error   2e-7 rel of reference::planet::segment_length
+/// error   3e-7 rel of reference::planet::segment_length
 /// source  elementary
 fn segment_length(segment: ShellSegment) -> f32 {
     return max((segment.gap_near - segment.near) + (segment.far - segment.gap_far), 0.0);

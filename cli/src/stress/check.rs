@@ -526,7 +526,9 @@ impl<'a> Work<'a> {
                 moved[k] = x.to_bits();
             } else {
                 for k in &floats {
-                    let by = share * (2.0 * random.unit() - 1.0);
+                    // Of all sizes up to the share: close to a jump, large ones hide it.
+                    let size = share * 10_f64.powf(-8.0 * random.unit());
+                    let by = if random.bits() & 1 == 0 { size } else { -size };
                     moved[*k] = shift(f32::from_bits(row[*k]), by).to_bits();
                 }
             }

@@ -1234,6 +1234,7 @@ fn particular(entry: Entry) -> Entry {
         ("planet::shell", "sphere_span") => entry
             .branch("mu", &[-0.1, -0.01, -0.001, 1e-3, 0.01])
             .jumps("tangent rays, starts on the sphere", 1e-6),
+        ("planet::shell", "top_distance") => entry.jumps("level rays from the top", 1e-6),
         ("planet::shell", "ground_distance") => entry.jumps("tangent rays", 1e-6),
         ("planet::shell", "shell_segment") => entry
             .branch("h", &[100.0, 5e3, 6e3, 2e4])
