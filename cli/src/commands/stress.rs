@@ -10,6 +10,7 @@ use crate::commands::render::write_json;
 use crate::error::CliError;
 use crate::image::check_folder;
 use crate::stress::report::Report;
+use crate::stress::twins::registry;
 use crate::stress::{Plan, effects, energy, functions};
 
 /// Arguments of `veduta stress`.
@@ -110,10 +111,17 @@ pub fn run(args: &StressArgs) -> Result<(), CliError> {
     }
     bar.set_message("functions");
     let plan = args.plan();
-    let findings = functions(gpu, &library, &plan, &args.filter, &|done, all| {
-        bar.set_length(all);
-        bar.set_position(done);
-    })?;
+    let findings = functions(
+        gpu,
+        &library,
+        &registry(),
+        &plan,
+        &args.filter,
+        &|done, all| {
+            bar.set_length(all);
+            bar.set_position(done);
+        },
+    )?;
     let (integral_evaluations, integral_faults) = energy::check(gpu, &library, &args.filter)?;
     let pictures = if args.filter.is_empty() && !args.no_pictures {
         let quick = plan.evaluations < LONG;

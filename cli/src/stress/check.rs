@@ -377,18 +377,17 @@ impl<'a> Work<'a> {
         let results = self.device.run(&rows)?;
         let columns = self.subject.columns();
         let width = self.subject.outputs.len();
-        let mut at = 0;
-        for ((row, bits), kind) in rows
+        for (at, ((row, bits), kind)) in rows
             .chunks_exact(columns)
             .zip(results.chunks_exact(width))
             .zip(&kinds)
+            .enumerate()
         {
             self.judge(row, bits, *kind);
             if *kind == Kind::Sweep && at % SWEEP == 0 {
                 let rows = &rows[at * columns..(at + SWEEP) * columns];
                 self.judge_sweep(rows, &results[at * width..(at + SWEEP) * width]);
             }
-            at += 1;
         }
         self.found.seconds += start.elapsed().as_secs_f64();
         Ok(())

@@ -17,7 +17,7 @@ use veduta_compose::Library;
 
 use self::check::{Finding, Work};
 use self::subject::Subject;
-use self::twins::{Entry, registry};
+use self::twins::Entry;
 use crate::error::CliError;
 
 /// How much is done.
@@ -92,21 +92,21 @@ pub fn shares(weights: &[f64], plan: &Plan) -> Vec<u64> {
     }
 }
 
-/// Stresses the functions whose path holds `filter`; `progress` hears evaluations done and all.
+/// Stresses the functions whose path holds `filter` with the entries of [`twins::registry`]; `progress` hears evaluations
+/// done and all.
 ///
 /// # Errors
 /// Faults of composing, of the registry and of the device. What functions do wrong stands in the findings.
 pub fn functions(
     gpu: &Gpu,
     library: &Library,
+    entries: &[Entry],
     plan: &Plan,
     filter: &str,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Vec<Finding>, CliError> {
     let subjects = Subject::all(library)?;
-    let entries = registry();
-    // What a user's own modules hold has no twin here.
-    let mut chosen = pairs(&subjects, &entries)?;
+    let mut chosen = pairs(&subjects, entries)?;
     chosen.retain(|(subject, _)| subject.path.contains(filter));
     if chosen.is_empty() {
         return Err(CliError::Missing {

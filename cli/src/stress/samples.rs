@@ -62,10 +62,6 @@ const FEW: usize = 4096;
 /// The limit of a domain that has none.
 const LARGE: f64 = 1e30;
 
-fn least_above(x: f32) -> f32 {
-    x.next_up()
-}
-
 impl Column {
     fn ends(&self, lo: f64, hi: f64) -> (f64, f64) {
         let (mut lo, mut hi) = (lo.max(-LARGE), hi.min(LARGE));
@@ -73,7 +69,7 @@ impl Column {
             // The numbers of a header are meant as those of the function: f32.
             (lo, hi) = (f64::from(lo as f32), f64::from(hi as f32));
             if self.lo_open {
-                lo = f64::from(least_above(lo as f32));
+                lo = f64::from((lo as f32).next_up());
             }
             if self.hi_open {
                 hi = f64::from((hi as f32).next_down());
@@ -141,7 +137,9 @@ impl Column {
                 .into_iter()
                 .filter_map(|v| match self.scalar {
                     Scalar::I32 => {
-                        let whole = (v >= -2_147_483_648.0 && v <= 2_147_483_647.0).then_some(v)?;
+                        let whole = (-2_147_483_648.0..=2_147_483_647.0)
+                            .contains(&v)
+                            .then_some(v)?;
                         Some((whole as i32).cast_unsigned())
                     }
                     _ => (0.0..=4_294_967_295.0).contains(&v).then_some(v as u32),

@@ -9,4 +9,5 @@ mod frozen;
 mod lint;
 mod list;
 mod render;
+mod stress;
 mod usage;

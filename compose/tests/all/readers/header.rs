@@ -145,7 +145,9 @@ fn the_refused_examples_of_the_documentation_are_refused() {
 #[test]
 fn the_grammar_of_the_documentation_names_every_key() {
     let grammar = blocks(GRAMMAR, "ebnf");
-    for key in ["domain", "range", "error", "monotone", "outside", "source", "internal"] {
+    for key in [
+        "domain", "range", "error", "monotone", "outside", "source", "internal",
+    ] {
         assert!(grammar[0].contains(&format!("\n{key} ")), "{key}");
         assert!(grammar[0].contains(&format!("\"{key}\"")), "{key}");
     }
