@@ -68,7 +68,7 @@ fn warped_slope_3d(
 /// domain  strength in [0, 2] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-3.21, 3.21] 1
-/// error   2e-4 abs of reference::fractal::warp::warped_fbm_2d
+/// error   6e-4 abs of reference::fractal::warp::warped_fbm_2d
 /// outside undefined
 /// source  Quilez2002
 fn warped_fbm_2d(
@@ -98,7 +98,7 @@ fn warped_fbm_2d(
 /// domain  strength in [0, 2] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-200000, 200000] 1
-/// error   5 abs of reference::fractal::warp::warped_fbm_2d_slope
+/// error   15 abs of reference::fractal::warp::warped_fbm_2d_slope
 /// outside undefined
 /// source  Quilez2002; the gradient is ours
 fn warped_fbm_2d_slope(
@@ -125,7 +125,7 @@ fn warped_fbm_2d_slope(
 /// domain  strength in [0, 2] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-3.21, 3.21] 1
-/// error   2e-4 abs of reference::fractal::warp::warped_fbm_3d
+/// error   6e-4 abs of reference::fractal::warp::warped_fbm_3d
 /// outside undefined
 /// source  Quilez2002
 fn warped_fbm_3d(
@@ -156,7 +156,7 @@ fn warped_fbm_3d(
 /// domain  strength in [0, 2] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-550000, 550000] 1
-/// error   5 abs of reference::fractal::warp::warped_fbm_3d_slope
+/// error   20 abs of reference::fractal::warp::warped_fbm_3d_slope
 /// outside undefined
 /// source  Quilez2002; the gradient is ours
 fn warped_fbm_3d_slope(

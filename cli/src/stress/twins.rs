@@ -1222,7 +1222,7 @@ fn particular(entry: Entry) -> Entry {
             .jumps("crests, and weights that are cut off", 1e-6)
             .weight(20.0),
         ("fractal::warp", "warped_slope_2d" | "warped_slope_3d") => entry,
-        ("fractal::warp", _) => entry.weight(50.0),
+        ("fractal::warp", _) => entry.weight(8.0),
         ("fractal::fbm" | "fractal::hybrid" | "fractal::ridged", _) => entry.weight(20.0),
         ("math::series", _) => entry.branch("x", &[0.5, 16.6, 88.7]),
         ("medium::transmittance", "step_integral") => entry.branch("distance", &[0.5, 5.0]),
