@@ -210,7 +210,7 @@ fn pictures_that_are_negative_too_bright_or_not_finite_are_found() {
         let file = dir.join(path);
         std::fs::create_dir_all(file.parent().unwrap()).unwrap();
         let from = "return coverage / (PI * area);";
-        let to = "let factor = select(select(-1.0, 1e20, dir.x > 0.0), 1e38, dir.z > 0.5);\n    \
+        let to = "let factor = select(select(-1.0, 1e20, dir.y > 0.1), 1e38, dir.y > 0.4);\n    \
                   return factor * coverage / (PI * area);";
         std::fs::write(file, text.replace(from, to)).unwrap();
     }
