@@ -86,7 +86,7 @@ pub struct Finding {
     pub outside_undefined: bool,
     /// What arguments are made of, and where rows are left out.
     pub notes: Vec<String>,
-    /// What is wrong; at most [`MOST_FAULTS`] of a kind.
+    /// What is wrong; at most three of a kind.
     pub faults: Vec<Fault>,
     /// Seconds that it took, on one thread.
     pub seconds: f64,
