@@ -22,7 +22,7 @@ pub struct StressArgs {
     /// Less than two minutes on a software device: what the tests run
     #[arg(long, conflicts_with = "evaluations")]
     pub quick: bool,
-    /// Evaluations of all functions together; from 1e8 on a bound fails that is more than eight times too generous
+    /// Evaluations of all functions together; from 1e9 on a bound fails that is more than eight times too generous
     #[arg(long, value_name = "N", value_parser = parse_count)]
     pub evaluations: Option<u64>,
     /// Fail bounds that are too generous, whatever the number of evaluations
@@ -42,8 +42,10 @@ pub struct StressArgs {
     pub sources: SourceArgs,
 }
 
-/// From so many evaluations on a run is long.
-const LONG: u64 = 100_000_000;
+/// From so many evaluations on a bound that is too generous fails.
+const LONG: u64 = 1_000_000_000;
+/// From so many evaluations on all pictures are drawn.
+const ALL_PICTURES: u64 = 100_000_000;
 const QUICK: u64 = 2_000_000;
 const USUAL: u64 = 20_000_000;
 
@@ -124,7 +126,7 @@ pub fn run(args: &StressArgs) -> Result<(), CliError> {
     )?;
     let (integral_evaluations, integral_faults) = energy::check(gpu, &library, &args.filter)?;
     let pictures = if args.filter.is_empty() && !args.no_pictures {
-        let quick = plan.evaluations < LONG;
+        let quick = plan.evaluations < ALL_PICTURES;
         Some(effects::check(gpu, &args.sources, quick, &|what| {
             bar.set_message(what.to_owned());
         })?)

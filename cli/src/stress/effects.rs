@@ -190,7 +190,15 @@ impl Stage {
             }
             Err(error) => return Err(error),
         };
-        self.renderer.draw(&view, Tiling::Fixed(16), &mut |_| {})?;
+        match self.renderer.draw(&view, Tiling::Fixed(16), &mut |_| {}) {
+            Ok(_) => {}
+            // An eye near the centre of a small planet.
+            Err(CliError::Veduta(veduta::Error::OutOfDomain { .. })) => {
+                self.found.refused += 1;
+                return self.reset(values);
+            }
+            Err(error) => return Err(error),
+        }
         let rgba = self.renderer.read_rgba32()?;
         let bound = radiance_bound(&settings, &view);
         self.found.drawn += 1;
