@@ -16,7 +16,10 @@ use crate::device::Gpu;
 use crate::error::Error;
 
 /// Largest number of columns of a row.
-pub const MAX_COLUMNS: usize = 16;
+pub const MAX_COLUMNS: usize = 64;
+
+/// What every row has room for, so that an expression may name columns that a narrow row leaves out.
+const USUAL_COLUMNS: usize = 16;
 
 const WORKGROUP: u32 = 64;
 const CHUNK_ROWS: usize = 1 << 20;
@@ -196,9 +199,10 @@ fn source<'a>(spec: &Spec<'a>, store: &str, width: usize) -> Source<'a> {
     };
     source.add(prelude_file, spec.prelude.to_owned(), "");
     let columns = spec.columns;
+    let room = columns.max(USUAL_COLUMNS);
     let _ = writeln!(
         source.text,
-        "struct EvalRow {{ i: array<i32, {MAX_COLUMNS}>, u: array<u32, {MAX_COLUMNS}>, f: array<f32, {MAX_COLUMNS}> }}
+        "struct EvalRow {{ i: array<i32, {room}>, u: array<u32, {room}>, f: array<f32, {room}> }}
 @group(0) @binding(0) var<storage, read> eval_rows: array<u32>;
 @group(0) @binding(1) var<storage, read_write> eval_results: array<u32>;
 @compute @workgroup_size({WORKGROUP})

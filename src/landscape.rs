@@ -500,6 +500,20 @@ impl Landscape {
                 domain: "in [-10000, 1e8] m".to_owned(),
             });
         }
+        // Below the centre of a small planet there is no up.
+        let radius = self
+            .settings
+            .number("PLANET_RADIUS")
+            .unwrap_or(f64::INFINITY);
+        if altitude < -0.5 * radius {
+            return Err(Error::OutOfDomain {
+                name: "view.eye altitude".to_owned(),
+                value: format!("{altitude} m"),
+                domain: format!(
+                    "at least half of PLANET_RADIUS, {radius} m, above the planet's centre"
+                ),
+            });
+        }
         let [ray_middle, ray_right, ray_up] = view.rays()?.map(|v| v.to_array());
         let block = ViewBlock {
             ray_middle,

@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands;
 
-/// Outdoor landscapes for wgpu: render, compose, lint, list, bench, cost, eval.
+/// Outdoor landscapes for wgpu: render, compose, lint, list, bench, cost, stress, eval.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "veduta", version, about, arg_required_else_help = true)]
 pub struct Args {
@@ -29,6 +29,8 @@ pub enum Command {
     Bench(Box<commands::bench::BenchArgs>),
     /// Count and measure what each feature of a scene adds
     Cost(commands::cost::CostArgs),
+    /// Try adversarial inputs on every public function and every effect
+    Stress(commands::stress::StressArgs),
     /// Evaluate a WGSL expression over rows of numbers on the device
     Eval(commands::eval::EvalArgs),
 }
@@ -46,6 +48,7 @@ impl Args {
             Command::List(args) => commands::list::run(args),
             Command::Bench(args) => commands::bench::run(args),
             Command::Cost(args) => commands::cost::run(args),
+            Command::Stress(args) => commands::stress::run(args),
             Command::Eval(args) => commands::eval::run(args),
         }
     }

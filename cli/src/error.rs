@@ -78,6 +78,12 @@ pub enum CliError {
         /// What it said.
         what: String,
     },
+    /// `veduta stress` has found something wrong; it has been printed.
+    #[error("{count} thing{} wrong", if *.count == 1 { " is" } else { "s are" })]
+    Stress {
+        /// How many.
+        count: usize,
+    },
     /// `veduta lint` has found faults; they have been printed.
     #[error("{count} fault{} found", if *.count == 1 { "" } else { "s" })]
     Lint {

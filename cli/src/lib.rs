@@ -12,6 +12,7 @@ pub mod image;
 pub mod metrics;
 pub mod render;
 pub mod shipped;
+pub mod stress;
 pub mod table;
 
 pub use args::Args;

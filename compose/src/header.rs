@@ -125,6 +125,8 @@ pub struct FnHeader {
     pub monotone: Vec<String>,
     /// Where the formula is from; several lines are joined by `; `.
     pub source: Option<String>,
+    /// Whether results outside of the domains may be infinite or NaN.
+    pub outside_undefined: bool,
     /// Whether the function is not meant for importers.
     pub internal: bool,
 }
@@ -161,6 +163,15 @@ pub struct Function {
     pub place: Place,
 }
 
+/// A structure with the types of its members.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Struct {
+    /// The name.
+    pub name: String,
+    /// The members in their order.
+    pub members: Vec<Param>,
+}
+
 /// The headers of a module.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -173,6 +184,8 @@ pub struct Headers {
     pub symbols: Option<String>,
     /// All functions in the order of the file.
     pub functions: Vec<Function>,
+    /// All structures in the order of the file.
+    pub structs: Vec<Struct>,
 }
 
 /// Reads and lints the headers of a module file.
@@ -188,7 +201,9 @@ pub fn parse_headers(file: &str, text: &str) -> Result<Headers, Diags> {
         faults: Vec::new(),
     };
     let mut headers = lint.module();
-    for raw in Scan::new(text).functions() {
+    let (functions, structs) = Scan::new(text).declarations();
+    headers.structs = structs;
+    for raw in functions {
         if lint.faults.len() >= MOST_FAULTS {
             break;
         }
@@ -274,8 +289,9 @@ impl<'a> Scan<'a> {
         &rest[..rest.find(['\n', '\r']).unwrap_or(rest.len())]
     }
 
-    fn functions(mut self) -> Vec<RawFunction<'a>> {
+    fn declarations(mut self) -> (Vec<RawFunction<'a>>, Vec<Struct>) {
         let mut found = Vec::new();
+        let mut structs = Vec::new();
         while let Some(byte) = self.byte() {
             match byte {
                 b'/' if self.comment() => {}
@@ -298,8 +314,10 @@ impl<'a> Scan<'a> {
                         continue;
                     }
                     let doc = std::mem::take(&mut self.doc);
-                    if word == "fn" {
-                        found.extend(self.function(doc));
+                    match word {
+                        "fn" => found.extend(self.function(doc)),
+                        "struct" => structs.extend(self.structure()),
+                        _ => {}
                     }
                 }
                 b';' => {
@@ -309,7 +327,7 @@ impl<'a> Scan<'a> {
                 _ => self.at += 1,
             }
         }
-        found
+        (found, structs)
     }
 
     /// A comment; lines of headers are kept.
@@ -473,14 +491,31 @@ impl<'a> Scan<'a> {
         })
     }
 
-    /// The parameters, behind `(`, and the closing parenthesis.
+    /// The rest of a structure behind `struct`, up to its last member.
+    fn structure(&mut self) -> Option<Struct> {
+        self.blanks();
+        let name = self.word();
+        self.blanks();
+        if name.is_empty() || self.byte() != Some(b'{') {
+            return None;
+        }
+        self.at += 1;
+        let members = self.params();
+        self.doc.clear();
+        Some(Struct {
+            name: name.to_owned(),
+            members,
+        })
+    }
+
+    /// The parameters, behind `(`, and the closing parenthesis; or the members of a structure, and its closing brace.
     fn params(&mut self) -> Vec<Param> {
         let mut params = Vec::new();
         loop {
             self.blanks();
             match self.byte() {
                 None | Some(b'{' | b';') => return params,
-                Some(b')') => {
+                Some(b')' | b'}') => {
                     self.at += 1;
                     return params;
                 }
@@ -511,7 +546,7 @@ impl<'a> Scan<'a> {
                     '<' | '(' | '[' => level += 1,
                     ',' | ')' if level == 0 => break,
                     '>' | ')' | ']' => level = level.saturating_sub(1),
-                    '{' | ';' => break,
+                    '{' | '}' | ';' => break,
                     _ => {}
                 }
                 ty.push(c);
@@ -559,7 +594,9 @@ fn limits(ty: &str) -> Option<(f64, f64, bool)> {
     }
 }
 
-const KEYS: [&str; 6] = ["domain", "range", "error", "monotone", "source", "internal"];
+const KEYS: [&str; 7] = [
+    "domain", "range", "error", "monotone", "outside", "source", "internal",
+];
 
 const FORM_DOMAIN: &str = "`domain NAME in [LO, HI] UNIT lin|log`";
 const FORM_RANGE: &str = "`range [LO, HI] UNIT`";
@@ -724,6 +761,14 @@ impl<'a> Lint<'a> {
                         Some(source) => format!("{source}; {}", rest.text),
                         None => rest.text.to_owned(),
                     });
+                }
+                "outside" => {
+                    if rest.text != "undefined" {
+                        self.fault(at, "the form is `outside undefined`");
+                    } else if header.outside_undefined {
+                        self.fault(at, "a second `outside undefined`");
+                    }
+                    header.outside_undefined = true;
                 }
                 "internal" if rest.text.is_empty() => header.internal = true,
                 _ if keyed => self.fault_with(

@@ -161,7 +161,8 @@ fn neighbour<const N: usize>(cell: [i32; N], offset: [i32; N]) -> [i32; N] {
     std::array::from_fn(|axis| cell[axis].wrapping_add(offset[axis]))
 }
 
-/// Value noise in 2D and its gradient, with the cells of the corners passed through `home`.
+/// Value noise in 2D and its gradient, with the cells of the corners passed through `home`. The cell itself is, before its
+/// neighbours are taken: beyond the largest integer there are none.
 fn value_2d(
     cell: [i32; 2],
     frac: [f64; 2],
@@ -169,8 +170,9 @@ fn value_2d(
     home: impl Fn([i32; 2]) -> [i32; 2],
 ) -> [f64; 3] {
     let p = split_2d(cell, frac);
+    let base = home(p.cell);
     let (value, [dx, dy]) = blend(p.frac, |offset| {
-        let word = lattice_hash_2d(home(neighbour(p.cell, offset)), seed)[0];
+        let word = lattice_hash_2d(home(neighbour(base, offset)), seed)[0];
         (unit_float(word), [0.0; 2])
     });
     [value, dx, dy]
@@ -194,8 +196,9 @@ fn value_3d(
     home: impl Fn([i32; 3]) -> [i32; 3],
 ) -> [f64; 4] {
     let p = split_3d(cell, frac);
+    let base = home(p.cell);
     let (value, [dx, dy, dz]) = blend(p.frac, |offset| {
-        let word = lattice_word_3d(home(neighbour(p.cell, offset)), seed);
+        let word = lattice_word_3d(home(neighbour(base, offset)), seed);
         (low_unit(word), [0.0; 3])
     });
     [value, dx, dy, dz]
@@ -327,8 +330,9 @@ pub fn gradient_noise_2d_periodic_slope(
     seed: u32,
 ) -> [f64; 3] {
     let p = split_2d(cell, frac);
+    let base = wrap_2d(p.cell, period);
     let (value, [dx, dy]) = gradient_blend(p.frac, |offset| {
-        lattice_gradient_2d(wrap_2d(neighbour(p.cell, offset), period), seed)
+        lattice_gradient_2d(wrap_2d(neighbour(base, offset), period), seed)
     });
     [value, dx, dy]
 }
@@ -341,8 +345,9 @@ pub fn gradient_noise_3d_periodic_slope(
     seed: u32,
 ) -> [f64; 4] {
     let p = split_3d(cell, frac);
+    let base = wrap_3d(p.cell, period);
     let (value, [dx, dy, dz]) = gradient_blend(p.frac, |offset| {
-        lattice_gradient_3d(wrap_3d(neighbour(p.cell, offset), period), seed)
+        lattice_gradient_3d(wrap_3d(neighbour(base, offset), period), seed)
     });
     [value, dx, dy, dz]
 }

@@ -84,7 +84,12 @@ pub fn sphere_span(ground_radius: f64, level: f64, h: f64, mu: f64) -> Span {
 
 /// Distance to the top of the shell.
 pub fn top_distance(ground_radius: f64, top: f64, h: f64, mu: f64) -> f64 {
-    sphere_span(ground_radius, top, h.min(top), mu).far
+    let h = h.min(top);
+    // The roots of t^2 + 2 b t - c = 0; their product is -c, and upwards the far one is a small difference.
+    let b = (ground_radius + h) * mu;
+    let c = (top - h) * (2.0 * ground_radius + top + h);
+    let root = (b * b + c).sqrt();
+    if b > 0.0 { c / (b + root) } else { root - b }
 }
 
 /// Distance to the ground sphere; -1 when the ray misses it.

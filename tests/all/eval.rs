@@ -136,7 +136,7 @@ fn faults_are_typed() {
         .unwrap_err()
         .to_string()
     };
-    assert!(new("in.f[0]", 17).contains("1 to 16"));
+    assert!(new("in.f[0]", 65).contains("1 to 64"));
     assert!(new("mat2x2f(in.f[0], 0.0, 0.0, 1.0)", 1).contains("scalar or a vector"));
     assert!(Column::parse_list("i,x").is_err() && Column::parse_list("").is_err());
     let f = evaluator(&[], "", "in.f[0]", 2);

@@ -40,6 +40,7 @@ struct SkyLight {
 /// range   [0, 1] 1
 /// error   4e-7 abs of reference::atmosphere::air_density
 /// monotone h
+/// outside undefined
 /// source  Leitner2022 eq. 3.15
 fn air_density(atmosphere: Atmosphere, h: f32) -> vec2<f32> {
     return exp(max(h, 0.0) / vec2<f32>(-atmosphere.rayleigh_height, -atmosphere.mie_height));
@@ -51,8 +52,9 @@ fn air_density(atmosphere: Atmosphere, h: f32) -> vec2<f32> {
 /// domain  h in [0, 1e5] m lin
 /// domain  mu in [-0.1, 1] 1 lin
 /// domain  steps in [1, 512] 1 lin
-/// range   [0, 1e7] m
+/// range   [0, 2.5e7] m
 /// error   2e-5 rel of reference::atmosphere::air_column
+/// outside undefined
 /// source  Leitner2022 alg. 7 (raymarchToLight)
 fn air_column(atmosphere: Atmosphere, h: f32, mu: f32, steps: i32) -> vec2<f32> {
     let count = max(steps, 1);
@@ -72,7 +74,8 @@ fn air_column(atmosphere: Atmosphere, h: f32, mu: f32, steps: i32) -> vec2<f32> 
 /// domain  mu in [-1, 1] 1 lin
 /// domain  steps in [1, 512] 1 lin
 /// range   [0, 1] 1
-/// error   1e-6 abs of reference::atmosphere::sun_transmittance
+/// error   2e-6 abs of reference::atmosphere::sun_transmittance
+/// outside undefined
 /// source  Leitner2022 eq. 3.1 along the path to the sun
 fn sun_transmittance(atmosphere: Atmosphere, h: f32, mu: f32, steps: i32) -> vec3<f32> {
     let column = air_column(atmosphere, h, mu, steps);
@@ -90,7 +93,8 @@ fn sun_transmittance(atmosphere: Atmosphere, h: f32, mu: f32, steps: i32) -> vec
 /// domain  steps in [1, 1024] 1 lin
 /// domain  light_steps in [1, 512] 1 lin
 /// range   [0, 100] 1/sr
-/// error   1e-5 abs of reference::atmosphere::march_sky
+/// error   2e-5 abs of reference::atmosphere::march_sky
+/// outside undefined
 /// source  Leitner2022 alg. 7; departs: half a step less attenuation, planet shadow
 fn march_sky(atmosphere: Atmosphere, eye_altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, distance: f32, steps: i32, light_steps: i32) -> SkyLight {
     let radius = atmosphere.ground_radius;

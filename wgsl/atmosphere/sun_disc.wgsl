@@ -11,9 +11,10 @@ const PI: f32 = 3.14159265;
 /// domain  dir in [-1, 1] 1 lin
 /// domain  to_sun in [-1, 1] 1 lin
 /// domain  angular_radius in [1e-3, 0.1] rad log
-/// domain  pixel_angle in [0, 0.1] rad lin
+/// domain  pixel_angle in [1e-4, 0.1] rad log
 /// range   [0, 4e5] 1/sr
-/// error   1e-3 abs of reference::atmosphere::sun_disc
+/// error   20 abs of reference::atmosphere::sun_disc
+/// outside undefined
 /// source  chord distance to the disc's centre; area of the ramp in closed form
 fn sun_disc(dir: vec3<f32>, to_sun: vec3<f32>, angular_radius: f32, pixel_angle: f32) -> f32 {
     let ramp = max(pixel_angle, 1e-7);

@@ -13,6 +13,7 @@
 /// domain  background in [0, 10] 1 lin
 /// range   [0, 1000] 1/sr
 /// error   1e-6 rel of reference::clouds::composite_clouds
+/// outside undefined
 /// source  eq. 4.3 for a layer of partial transmittance
 fn composite_clouds(clouds: CloudLight, sun_light: vec3<f32>, front: SkyLight, background: vec3<f32>) -> vec3<f32> {
     let behind = max(background - front.in_scatter, vec3<f32>(0.0));

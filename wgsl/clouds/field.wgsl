@@ -44,7 +44,7 @@ struct CloudLayer {
 /// domain  coverage in [0.01, 1] 1 lin
 /// domain  uniformity in [0, 1] 1 lin
 /// range   [0, 1] 1
-/// error   1e-5 abs of reference::clouds::shape_coverage
+/// error   2e-5 abs of reference::clouds::shape_coverage
 /// monotone n
 /// source  the usual remapping max(0, (n - (1 - coverage)) / coverage); floor 1e-6 under the divisor
 fn shape_coverage(n: f32, coverage: f32, uniformity: f32) -> f32 {

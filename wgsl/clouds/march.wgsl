@@ -26,8 +26,9 @@ struct CloudLight {
 /// domain  ground_radius in [3e6, 1e8] m log
 /// domain  altitude in [4000, 5500] m lin
 /// domain  mu in [-1, 1] 1 lin
-/// range   [0, 3e5] m
+/// range   [0, 1.2e6] m
 /// error   1e-4 rel of reference::clouds::layer_exit
+/// outside undefined
 /// source  elementary
 fn layer_exit(layer: CloudLayer, ground_radius: f32, altitude: f32, mu: f32) -> f32 {
     let inner = sphere_span(ground_radius, layer.bottom, altitude, mu);
@@ -44,8 +45,9 @@ fn layer_exit(layer: CloudLayer, ground_radius: f32, altitude: f32, mu: f32) -> 
 /// domain  to_sun in [-1, 1] 1 lin
 /// domain  mu in [-1, 1] 1 lin
 /// domain  steps in [1, 64] 1 lin
-/// range   [0, 2e4] 1
+/// range   [0, 8e4] 1
 /// error   5e-3 rel of reference::clouds::sun_depth
+/// outside undefined
 /// source  Leitner2022 ch. 4.5 (secondary march)
 fn sun_depth(layer: CloudLayer, ground_radius: f32, relative: vec3<f32>, altitude: f32, to_sun: vec3<f32>, mu: f32, steps: i32) -> f32 {
     let count = max(steps, 1);
@@ -72,7 +74,8 @@ fn sun_depth(layer: CloudLayer, ground_radius: f32, relative: vec3<f32>, altitud
 /// domain  light_steps in [1, 64] 1 lin
 /// domain  jitter in [0, 1] 1 lin
 /// range   [0, 100] 1/sr
-/// error   2e-4 abs of reference::clouds::march_clouds
+/// error   3e-4 abs of reference::clouds::march_clouds
+/// outside undefined
 /// source  Leitner2022 ch. 4.5 and eq. 3.14
 fn march_clouds(layer: CloudLayer, ground_radius: f32, eye_altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, max_distance: f32,
     steps: i32, light_steps: i32, jitter: f32) -> CloudLight {
@@ -118,7 +121,8 @@ fn march_clouds(layer: CloudLayer, ground_radius: f32, eye_altitude: f32, dir: v
 /// domain  min_transmittance in [0, 0.1] 1 lin
 /// domain  jitter in [0, 1] 1 lin
 /// range   [0, 100] 1/sr
-/// error   2e-4 abs of reference::clouds::march_clouds
+/// error   3e-4 abs of reference::clouds::march_clouds
+/// outside undefined
 /// source  Leitner2022 ch. 4.5 and eq. 3.14; skipping: ours
 fn march_clouds_skip(layer: CloudLayer, ground_radius: f32, eye_altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, max_distance: f32,
     steps: i32, light_steps: i32, min_transmittance: f32, jitter: f32) -> CloudLight {

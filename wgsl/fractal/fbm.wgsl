@@ -22,6 +22,7 @@
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-16, 16] 1
 /// error   4e-6 abs of reference::fractal::fbm_2d
+/// outside undefined
 /// source  Leitner2022 alg. 1
 fn fbm_2d(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed: u32) -> f32 {
     let fall = octave_fall(hurst);
@@ -46,6 +47,7 @@ fn fbm_2d(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed: u32)
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-16, 16] 1
 /// error   3e-6 abs of reference::fractal::fbm_3d
+/// outside undefined
 /// source  Leitner2022 alg. 1
 fn fbm_3d(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed: u32) -> f32 {
     let fall = octave_fall(hurst);
@@ -72,6 +74,7 @@ fn fbm_3d(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed: u32)
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-400000, 400000] 1
 /// error   0.1 abs of reference::fractal::fbm_2d_slope
+/// outside undefined
 /// source  Leitner2022 alg. 1
 fn fbm_2d_slope(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed: u32) -> vec3<f32> {
     let fall = octave_fall(hurst);
@@ -99,6 +102,7 @@ fn fbm_2d_slope(cell: vec2<i32>, frac: vec2<f32>, octaves: i32, hurst: f32, seed
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-550000, 550000] 1
 /// error   0.1 abs of reference::fractal::fbm_3d_slope
+/// outside undefined
 /// source  Leitner2022 alg. 1
 fn fbm_3d_slope(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed: u32) -> vec4<f32> {
     let fall = octave_fall(hurst);
@@ -124,6 +128,7 @@ fn fbm_3d_slope(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [0, 1] 1
 /// error   1e-6 abs of reference::fractal::fbm_value_3d
+/// outside undefined
 /// source  Leitner2022 8.2; departs: normalised
 fn fbm_value_3d(cell: vec3<i32>, frac: vec3<f32>, octaves: i32, hurst: f32, seed: u32) -> f32 {
     let fall = octave_fall(hurst);
@@ -166,6 +171,7 @@ fn periodic_octave_3d(p: Lattice3d, size: vec3<i32>, i: i32, seed: u32) -> f32 {
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [0, 1] 1
 /// error   1e-6 abs of reference::fractal::fbm_value_3d_periodic
+/// outside undefined
 /// source  Leitner2022 8.2; departs: normalised, periodic lattice
 fn fbm_value_3d_periodic(
     cell: vec3<i32>,

@@ -17,6 +17,7 @@
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-5000, 32] 1
 /// error   3e-5 abs of reference::fractal::hybrid_multifractal_2d
+/// outside undefined
 /// source  Leitner2022 alg. 2
 fn hybrid_multifractal_2d(
     cell: vec2<i32>,
@@ -55,6 +56,7 @@ fn hybrid_multifractal_2d(
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-inf, inf] 1
 /// error   0.4 abs of reference::fractal::hybrid_multifractal_2d_slope
+/// outside undefined
 /// source  Leitner2022 alg. 2
 fn hybrid_multifractal_2d_slope(
     cell: vec2<i32>,

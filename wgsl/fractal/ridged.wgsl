@@ -20,6 +20,7 @@
 /// domain  smoothness in [0, 1] 1 lin
 /// range   [0, 1.4142136] 1
 /// error   2e-7 abs of reference::fractal::smooth_abs
+/// outside undefined
 /// source  ours, after Leitner2022 4.4
 fn smooth_abs(n: f32, smoothness: f32) -> f32 {
     return select(abs(n), sqrt(n * n + smoothness), smoothness > 0.0);
@@ -36,6 +37,7 @@ fn smooth_abs(n: f32, smoothness: f32) -> f32 {
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [0, 16] 1
 /// error   1e-5 abs of reference::fractal::ridged_multifractal_2d
+/// outside undefined
 /// source  Leitner2022 alg. 3; departs: squared in every octave
 fn ridged_multifractal_2d(
     cell: vec2<i32>,
@@ -76,7 +78,8 @@ fn ridged_multifractal_2d(
 /// domain  smoothness in [0, 1] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-inf, inf] 1
-/// error   0.6 abs of reference::fractal::ridged_multifractal_2d_slope
+/// error   1.5 abs of reference::fractal::ridged_multifractal_2d_slope
+/// outside undefined
 /// source  Leitner2022 alg. 3; departs: squared in every octave
 fn ridged_multifractal_2d_slope(
     cell: vec2<i32>,
@@ -120,7 +123,8 @@ fn ridged_multifractal_2d_slope(
 /// domain  smoothness in [0, 1] 1 lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-7, 16] 1
-/// error   2e-5 abs of reference::fractal::ridged_multifractal_printed_2d
+/// error   1.2e-5 abs of reference::fractal::ridged_multifractal_printed_2d
+/// outside undefined
 /// source  Leitner2022 alg. 3
 fn ridged_multifractal_printed_2d(
     cell: vec2<i32>,

@@ -29,6 +29,7 @@ const AWAY_Z: vec3<f32> = vec3<f32>(0.421875, 0.265625, 0.703125);
 /// domain  strength in [0, 4] cell lin
 /// range   [-32832, 32832] 1
 /// error   0.006 abs of reference::fractal::warp::warped_slope_2d
+/// outside undefined
 /// source  ours (chain rule)
 fn warped_slope_2d(outer: vec3<f32>, warp_x: vec3<f32>, warp_y: vec3<f32>, strength: f32) -> vec3<f32> {
     return vec3<f32>(outer.x, outer.yz + strength * (outer.y * warp_x.yz + outer.z * warp_y.yz));
@@ -43,6 +44,7 @@ fn warped_slope_2d(outer: vec3<f32>, warp_x: vec3<f32>, warp_y: vec3<f32>, stren
 /// domain  strength in [0, 4] cell lin
 /// range   [-49216, 49216] 1
 /// error   0.01 abs of reference::fractal::warp::warped_slope_3d
+/// outside undefined
 /// source  ours (chain rule)
 fn warped_slope_3d(
     outer: vec4<f32>,
@@ -67,6 +69,7 @@ fn warped_slope_3d(
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-3.21, 3.21] 1
 /// error   6e-4 abs of reference::fractal::warp::warped_fbm_2d
+/// outside undefined
 /// source  Quilez2002
 fn warped_fbm_2d(
     cell: vec2<i32>,
@@ -95,7 +98,8 @@ fn warped_fbm_2d(
 /// domain  strength in [0, 2] cell lin
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-200000, 200000] 1
-/// error   20 abs of reference::fractal::warp::warped_fbm_2d_slope
+/// error   15 abs of reference::fractal::warp::warped_fbm_2d_slope
+/// outside undefined
 /// source  Quilez2002; the gradient is ours
 fn warped_fbm_2d_slope(
     cell: vec2<i32>,
@@ -122,6 +126,7 @@ fn warped_fbm_2d_slope(
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-3.21, 3.21] 1
 /// error   6e-4 abs of reference::fractal::warp::warped_fbm_3d
+/// outside undefined
 /// source  Quilez2002
 fn warped_fbm_3d(
     cell: vec3<i32>,
@@ -152,6 +157,7 @@ fn warped_fbm_3d(
 /// domain  seed in [0, 4294967295] 1 lin
 /// range   [-550000, 550000] 1
 /// error   20 abs of reference::fractal::warp::warped_fbm_3d_slope
+/// outside undefined
 /// source  Quilez2002; the gradient is ours
 fn warped_fbm_3d_slope(
     cell: vec3<i32>,

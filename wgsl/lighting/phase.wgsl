@@ -34,6 +34,7 @@ fn phase_isotropic() -> f32 {
 /// domain  mu in [-1, 1] 1 lin
 /// range   [0.0596, 0.1194] 1/sr
 /// error   3e-7 rel of reference::phase::phase_rayleigh
+/// outside undefined
 /// source  Leitner2022 eq. 3.17
 fn phase_rayleigh(mu: f32) -> f32 {
     return 3.0 / (16.0 * PI) * (1.0 + mu * mu);
@@ -42,9 +43,10 @@ fn phase_rayleigh(mu: f32) -> f32 {
 /// Henyey and Greenstein's phase function; its mean cosine is g.
 ///
 /// domain  mu in [-1, 1] 1 lin
-/// domain  g in [-0.99, 0.99] 1 lin
-/// range   [0, 1600] 1/sr
+/// domain  g in [-0.999, 0.999] 1 lin
+/// range   [0, 1.6e5] 1/sr
 /// error   1e-6 rel of reference::phase::phase_henyey_greenstein
+/// outside undefined
 /// source  Leitner2022 eq. 3.10; floor 1e-12 under the denominator
 fn phase_henyey_greenstein(mu: f32, g: f32) -> f32 {
     let d = lobe_denominator(mu, g);
@@ -54,11 +56,12 @@ fn phase_henyey_greenstein(mu: f32, g: f32) -> f32 {
 /// Mixture of a forward and a backward Henyey-Greenstein lobe.
 ///
 /// domain  mu in [-1, 1] 1 lin
-/// domain  g_forward in [0, 0.99] 1 lin
-/// domain  g_backward in [-0.99, 0] 1 lin
+/// domain  g_forward in [0, 0.999] 1 lin
+/// domain  g_backward in [-0.999, 0] 1 lin
 /// domain  backward_share in [0, 1] 1 lin
-/// range   [0, 1600] 1/sr
+/// range   [0, 1.6e5] 1/sr
 /// error   1e-6 rel of reference::phase::phase_double_henyey_greenstein
+/// outside undefined
 /// source  Leitner2022 eq. 3.11
 fn phase_double_henyey_greenstein(mu: f32, g_forward: f32, g_backward: f32, backward_share: f32) -> f32 {
     return (1.0 - backward_share) * phase_henyey_greenstein(mu, g_forward)
@@ -69,8 +72,9 @@ fn phase_double_henyey_greenstein(mu: f32, g_forward: f32, g_backward: f32, back
 ///
 /// domain  mu in [-1, 1] 1 lin
 /// domain  g in [-0.9, 0.9] 1 lin
-/// range   [0, 20] 1/sr
+/// range   [0, 27] 1/sr
 /// error   3e-6 rel of reference::phase::phase_schlick
+/// outside undefined
 /// source  Leitner2022 eq. 3.12
 fn phase_schlick(mu: f32, g: f32) -> f32 {
     let strength = abs(g);
@@ -84,9 +88,10 @@ fn phase_schlick(mu: f32, g: f32) -> f32 {
 /// Cornette and Shanks' phase function for aerosols; its mean cosine is larger than g.
 ///
 /// domain  mu in [-1, 1] 1 lin
-/// domain  g in [-0.99, 0.99] 1 lin
-/// range   [0, 1600] 1/sr
+/// domain  g in [-0.999, 0.999] 1 lin
+/// range   [0, 1.6e5] 1/sr
 /// error   1e-6 rel of reference::phase::phase_cornette_shanks
+/// outside undefined
 /// source  Leitner2022 eq. 3.19
 fn phase_cornette_shanks(mu: f32, g: f32) -> f32 {
     let d = lobe_denominator(mu, g);
@@ -96,10 +101,11 @@ fn phase_cornette_shanks(mu: f32, g: f32) -> f32 {
 /// Draine's phase function: `alpha` 0 is Henyey and Greenstein's, 1 Cornette and Shanks'.
 ///
 /// domain  mu in [-1, 1] 1 lin
-/// domain  g in [-0.99, 0.99] 1 lin
+/// domain  g in [-0.999, 0.999] 1 lin
 /// domain  alpha in [0, 100] 1 lin
-/// range   [0, 1650] 1/sr
+/// range   [0, 1.6e5] 1/sr
 /// error   1e-6 rel of reference::phase::phase_draine
+/// outside undefined
 /// source  Draine2003
 fn phase_draine(mu: f32, g: f32, alpha: f32) -> f32 {
     let tilt = (1.0 + alpha * mu * mu) / (1.0 + alpha * ((1.0 + 2.0 * g * g) / 3.0));
@@ -153,6 +159,7 @@ fn phase_of_gap(mu: f32, gap: f32) -> f32 {
 /// domain  lobes.broad_share in [0, 1] 1 lin
 /// range   [0, 40000] 1/sr
 /// error   1.2e-6 rel of reference::phase::phase_droplets
+/// outside undefined
 /// source  JendersieDEon2023
 fn phase_droplets(mu: f32, lobes: DropletPhase) -> f32 {
     let g = 1.0 - lobes.broad_gap;
@@ -168,6 +175,7 @@ fn phase_droplets(mu: f32, lobes: DropletPhase) -> f32 {
 /// domain  diameter in [5e-6, 5e-5] m log
 /// range   [0, 40000] 1/sr
 /// error   2e-6 rel of reference::phase::phase_henyey_greenstein_draine
+/// outside undefined
 /// source  JendersieDEon2023
 fn phase_henyey_greenstein_draine(mu: f32, diameter: f32) -> f32 {
     return phase_droplets(mu, droplet_phase(diameter));

@@ -17,6 +17,7 @@ fn one_minus_exp_over_x_series(x: f32) -> f32 {
 /// range   [0, 1] 1
 /// error   5e-7 rel of reference::math::one_minus_exp_over_x
 /// monotone x
+/// outside undefined
 /// source  Taylor series below 0.5, the direct form above
 fn one_minus_exp_over_x(x: f32) -> f32 {
     let large = max(x, 0.5);
@@ -29,6 +30,7 @@ fn one_minus_exp_over_x(x: f32) -> f32 {
 /// range   [0, 1] 1
 /// error   5e-7 rel of reference::math::one_minus_exp
 /// monotone x
+/// outside undefined
 /// source  Taylor series below 0.5, the direct form above
 fn one_minus_exp(x: f32) -> f32 {
     return select(1.0 - exp(-x), x * one_minus_exp_over_x_series(x), x < 0.5);

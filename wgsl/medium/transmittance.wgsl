@@ -11,6 +11,7 @@
 /// range   [0, 1] 1
 /// error   3e-7 abs of reference::medium::beer_lambert
 /// monotone optical_depth
+/// outside undefined
 /// source  Leitner2022 eq. 3.1
 fn beer_lambert(optical_depth: vec3<f32>) -> vec3<f32> {
     return exp(-optical_depth);
@@ -23,6 +24,7 @@ fn beer_lambert(optical_depth: vec3<f32>) -> vec3<f32> {
 /// range   [0, 1e6] m
 /// error   6e-7 rel of reference::medium::step_integral
 /// monotone distance
+/// outside undefined
 /// source  Hillaire2015 energy-conserving step; series at small optical depth
 fn step_integral(extinction: f32, distance: f32) -> f32 {
     return distance * one_minus_exp_over_x(extinction * distance);

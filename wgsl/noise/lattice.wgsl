@@ -87,6 +87,7 @@ fn split_3d(cell: vec3<i32>, frac: vec3<f32>) -> Lattice3d {
 /// range   [1, 8.507059e37] 1
 /// error   0 abs of reference::noise::octave_frequency
 /// monotone i
+/// outside undefined
 /// source  Leitner2022 alg. 1 (lacunarity 2)
 fn octave_frequency(i: i32) -> f32 {
     return bitcast<f32>((i + 127) << 23u);
@@ -101,6 +102,7 @@ fn octave_frequency(i: i32) -> f32 {
 /// range   [0.0625, 1] 1
 /// error   1.2e-7 rel of reference::noise::octave_fall
 /// monotone hurst
+/// outside undefined
 /// source  Leitner2022 alg. 1 (amplitude f^-H)
 fn octave_fall(hurst: f32) -> f32 {
     let whole = floor(hurst + 0.5);
@@ -171,6 +173,7 @@ fn shifted_3d(p: Lattice3d, i: i32) -> Lattice3d {
 /// domain  i in [0, 21] 1 lin
 /// range   [0, 1] cell
 /// error   3e-8 abs of reference::noise::octave_2d
+/// outside undefined
 /// source  Leitner2022 alg. 1; departs: shifted lattices, integer cells
 fn octave_2d(cell: vec2<i32>, frac: vec2<f32>, i: i32) -> Lattice2d {
     let scaled = frac * octave_frequency(i);
@@ -186,6 +189,7 @@ fn octave_2d(cell: vec2<i32>, frac: vec2<f32>, i: i32) -> Lattice2d {
 /// domain  i in [0, 21] 1 lin
 /// range   [0, 1] cell
 /// error   3e-8 abs of reference::noise::octave_3d
+/// outside undefined
 /// source  Leitner2022 alg. 1; departs: shifted lattices, integer cells
 fn octave_3d(cell: vec3<i32>, frac: vec3<f32>, i: i32) -> Lattice3d {
     let scaled = frac * octave_frequency(i);
@@ -265,6 +269,7 @@ fn wrap_near_3d(cell: vec3<i32>, size: vec3<i32>) -> vec3<i32> {
 /// domain  t in [0, 1] 1 lin
 /// range   [0, 1] 1
 /// error   1e-7 abs of reference::noise::fade
+/// outside undefined
 /// source  Perlin2002
 fn fade_2d(t: vec2<f32>) -> vec2<f32> {
     let s = t - 0.5;
@@ -277,6 +282,7 @@ fn fade_2d(t: vec2<f32>) -> vec2<f32> {
 /// domain  t in [0, 1] 1 lin
 /// range   [0, 1] 1
 /// error   1e-7 abs of reference::noise::fade
+/// outside undefined
 /// source  Perlin2002
 fn fade_3d(t: vec3<f32>) -> vec3<f32> {
     let s = t - 0.5;
@@ -314,7 +320,8 @@ fn turn_3d(turns: vec3<f32>) -> vec3<u32> {
 ///
 /// domain  t in [0, 1] 1 lin
 /// range   [-2e-7, 1.875] 1
-/// error   3e-7 abs of reference::noise::fade_slope
+/// error   4e-7 abs of reference::noise::fade_slope
+/// outside undefined
 /// source  Perlin2002
 fn fade_slope_2d(t: vec2<f32>) -> vec2<f32> {
     let s = t - 0.5;
@@ -326,7 +333,8 @@ fn fade_slope_2d(t: vec2<f32>) -> vec2<f32> {
 ///
 /// domain  t in [0, 1] 1 lin
 /// range   [-2e-7, 1.875] 1
-/// error   3e-7 abs of reference::noise::fade_slope
+/// error   4e-7 abs of reference::noise::fade_slope
+/// outside undefined
 /// source  Perlin2002
 fn fade_slope_3d(t: vec3<f32>) -> vec3<f32> {
     let s = t - 0.5;

@@ -32,6 +32,7 @@ struct ShellSegment {
 /// domain  t in [0, 1e6] m lin
 /// range   [-1e8, 1.2e6] m
 /// error   0.4 abs of reference::planet::altitude_along
+/// outside undefined
 /// source  difference of squares divided by the sum of the radii
 fn altitude_along(ground_radius: f32, h: f32, mu: f32, t: f32) -> f32 {
     let r = ground_radius + h;
@@ -46,6 +47,7 @@ fn altitude_along(ground_radius: f32, h: f32, mu: f32, t: f32) -> f32 {
 /// domain  relative in [-5e5, 5e5] m lin
 /// range   [-1e6, 2e6] m
 /// error   0.4 abs of reference::planet::altitude_of
+/// outside undefined
 /// source  difference of squares divided by the sum of the radii
 fn altitude_of(ground_radius: f32, eye_altitude: f32, relative: vec3<f32>) -> f32 {
     let r = ground_radius + eye_altitude;
@@ -88,8 +90,9 @@ fn direction_cosine_along(ground_radius: f32, h: f32, altitude: f32, direction_m
 /// domain  level in [0, 1e5] m lin
 /// domain  h in [0, 1e5] m lin
 /// domain  mu in [-1, 1] 1 lin
-/// range   [-2e8, 2e8] m
+/// range   [-2.1e8, 2.1e8] m
 /// error   1e-3 rel of reference::planet::sphere_span
+/// outside undefined
 /// source  quadratic without cancellation; near a tangent ray the square root doubles the relative rounding's exponent
 fn sphere_span(ground_radius: f32, level: f32, h: f32, mu: f32) -> Span {
     let b = (ground_radius + h) * mu;
@@ -113,6 +116,7 @@ fn sphere_span(ground_radius: f32, level: f32, h: f32, mu: f32) -> Span {
 /// domain  mu in [-1, 1] 1 lin
 /// range   [0, 2.1e8] m
 /// error   6e-7 rel of reference::planet::top_distance
+/// outside undefined
 /// source  Bruneton2017 DistanceToTopAtmosphereBoundary; departs: altitude instead of radius
 fn top_distance(ground_radius: f32, top: f32, h: f32, mu: f32) -> f32 {
     let b = (ground_radius + h) * mu;
@@ -128,6 +132,7 @@ fn top_distance(ground_radius: f32, top: f32, h: f32, mu: f32) -> f32 {
 /// domain  mu in [-1, 1] 1 lin
 /// range   [-1, 5e6] m
 /// error   1e-3 rel of reference::planet::ground_distance
+/// outside undefined
 /// source  Bruneton2017 DistanceToBottomAtmosphereBoundary; departs: altitude instead of radius
 fn ground_distance(ground_radius: f32, h: f32, mu: f32) -> f32 {
     let b = (ground_radius + h) * mu;
@@ -147,6 +152,7 @@ fn ground_distance(ground_radius: f32, h: f32, mu: f32) -> f32 {
 /// domain  mu in [-1, 1] 1 lin
 /// range   [0, 1e7] m
 /// error   1e-3 rel of reference::planet::shell_segment
+/// outside undefined
 /// source  interval logic: ours
 fn shell_segment(ground_radius: f32, bottom: f32, top: f32, h: f32, mu: f32) -> ShellSegment {
     let outer = sphere_span(ground_radius, top, h, mu);
@@ -187,7 +193,7 @@ fn clip_segment(segment: ShellSegment, max_distance: f32) -> ShellSegment {
 /// Length of a segment without its gap.
 ///
 /// range   [0, 1e7] m
-/// error   2e-7 rel of reference::planet::segment_length
+/// error   3e-7 rel of reference::planet::segment_length
 /// source  elementary
 fn segment_length(segment: ShellSegment) -> f32 {
     return max((segment.gap_near - segment.near) + (segment.far - segment.gap_far), 0.0);

@@ -25,5 +25,5 @@ fn bayer_8x8(pixel: vec2<u32>) -> f32 {
 /// error   2e-7 abs of reference::post::dither
 /// source  Bayer1973
 fn dither(encoded: vec3<f32>, pixel: vec2<u32>, levels: f32) -> vec3<f32> {
-    return encoded + (bayer_8x8(pixel) - 0.5) / levels;
+    return encoded + (bayer_8x8(pixel) - 0.5) / max(levels, 1.0);
 }

@@ -22,6 +22,7 @@ fn encode_srgb(linear: vec3<f32>) -> vec3<f32> {
 /// range   [0, 1] 1
 /// error   1e-6 abs of reference::post::decode_srgb
 /// monotone encoded
+/// outside undefined
 /// source  IEC 61966-2-1
 fn decode_srgb(encoded: vec3<f32>) -> vec3<f32> {
     let signal = max(encoded, vec3<f32>(0.0));

@@ -35,6 +35,7 @@ struct Terrain {
 /// domain  octaves in [1, 16] 1 lin
 /// range   [-1e5, 1e5] m
 /// error   1.5e-2 abs of reference::terrain::height
+/// outside undefined
 /// source  Leitner2022 alg. 3
 @must_use
 virtual fn height(terrain: Terrain, offset: vec2<f32>, octaves: i32) -> f32 {

@@ -13,7 +13,8 @@
 /// domain  step in [1, 1000] m log
 /// domain  octaves in [1, 16] 1 lin
 /// range   [-1e4, 1e4] 1
-/// error   1e-2 abs of reference::terrain::terrain_slope
+/// error   3e-3 abs of reference::terrain::terrain_slope
+/// outside undefined
 /// source  Leitner2022 listing 5.3
 fn terrain_slope(terrain: Terrain, offset: vec2<f32>, step: f32, octaves: i32) -> vec2<f32> {
     let east = height(terrain, offset + vec2<f32>(step, 0.0), octaves);
@@ -29,7 +30,8 @@ fn terrain_slope(terrain: Terrain, offset: vec2<f32>, step: f32, octaves: i32) -
 /// domain  step in [1, 1000] m log
 /// domain  octaves in [1, 16] 1 lin
 /// range   [-1, 1] 1
-/// error   5e-3 abs of reference::terrain::local_normal
+/// error   3e-3 abs of reference::terrain::local_normal
+/// outside undefined
 /// source  Leitner2022 listing 5.3
 fn local_normal(terrain: Terrain, offset: vec2<f32>, step: f32, octaves: i32) -> vec3<f32> {
     let slope = terrain_slope(terrain, offset, step, octaves);
@@ -45,7 +47,8 @@ fn local_normal(terrain: Terrain, offset: vec2<f32>, step: f32, octaves: i32) ->
 /// domain  step in [1, 1000] m log
 /// domain  octaves in [1, 16] 1 lin
 /// range   [-1, 1] 1
-/// error   5e-3 abs of reference::terrain::terrain_normal
+/// error   3e-3 abs of reference::terrain::terrain_normal
+/// outside undefined
 /// source  Leitner2022 listing 5.3; departs: gradient on the sphere
 fn terrain_normal(terrain: Terrain, ground_radius: f32, eye_altitude: f32, relative: vec3<f32>, step: f32, octaves: i32) -> vec3<f32> {
     let slope = terrain_slope(terrain, relative.xz, step, octaves);

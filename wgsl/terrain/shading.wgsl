@@ -28,8 +28,12 @@ fn bounce_direction(to_sun: vec3<f32>) -> vec3<f32> {
 /// domain  normal in [-1, 1] 1 lin
 /// domain  to_sun in [-1, 1] 1 lin
 /// domain  shadow in [0, 1] 1 lin
+/// domain  lights.sun_color in [0, 10] 1 lin
+/// domain  lights.sky_color in [0, 10] 1 lin
+/// domain  lights.bounce_color in [0, 10] 1 lin
 /// range   [0, 30] 1
-/// error   5e-7 abs of reference::terrain::shade_three_lights
+/// error   3e-6 abs of reference::terrain::shade_three_lights
+/// outside undefined
 /// source  Leitner2022 eq. 4.1; departs: clamped at 0
 fn shade_three_lights(lights: ThreeLights, normal: vec3<f32>, to_sun: vec3<f32>, shadow: f32) -> vec3<f32> {
     let direct = max(dot(normal, to_sun), 0.0) * shadow;

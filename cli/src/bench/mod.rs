@@ -151,20 +151,28 @@ impl Bench {
 
     /// Device, driver, processor and clock, as lines of a document.
     pub fn machine(&self) -> String {
-        let info: wgpu::AdapterInfo = self.gpu.adapter.get_info();
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
         format!(
-            "- device: {}, {} ({:?}), {} {}\n- processor: {}, {threads} threads\n- clock: {}; pictures {}\n",
-            info.name,
-            info.backend,
-            info.device_type,
-            info.driver,
-            info.driver_info,
-            processor(),
+            "{}- clock: {}; pictures {}\n",
+            device_lines(&self.gpu),
             self.clock.describe(),
             self.size,
         )
     }
+}
+
+/// Device, driver and processor, as lines of a document.
+pub fn device_lines(gpu: &Gpu) -> String {
+    let info: wgpu::AdapterInfo = gpu.adapter.get_info();
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    format!(
+        "- device: {}, {} ({:?}), {} {}\n- processor: {}, {threads} threads\n",
+        info.name,
+        info.backend,
+        info.device_type,
+        info.driver,
+        info.driver_info,
+        processor(),
+    )
 }
 
 /// The processor's name, where the system tells.
@@ -178,7 +186,7 @@ fn processor() -> String {
         .unwrap_or_else(|| std::env::consts::ARCH.to_owned())
 }
 
-/// A table in Markdown: the first row is the head, and the columns are as wide as their widest cell.
+/// A table in Markdown: the first row is the head, and the columns are as wide as their widest cell, except the last.
 pub fn table(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let width = |c: usize| {
@@ -188,7 +196,10 @@ pub fn table(rows: &[Vec<String>]) -> String {
             .max()
             .unwrap_or(0)
     };
-    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut widths: Vec<usize> = (0..columns).map(width).collect();
+    if let (Some(last), Some(head)) = (widths.last_mut(), rows.first().and_then(|r| r.last())) {
+        *last = head.chars().count();
+    }
     let mut text = String::new();
     for (i, row) in rows.iter().enumerate() {
         for (cell, width) in row.iter().zip(&widths) {

@@ -18,7 +18,7 @@ pub struct EvalArgs {
     /// The WGSL expression; column k of a row is `in.f[k]`, `in.i[k]` or `in.u[k]`
     #[arg(long = "expr", value_name = "WGSL", allow_hyphen_values = true)]
     pub expression: String,
-    /// The type of each column, up to 16: i (i32), u (u32) or f (f32)
+    /// The type of each column, up to 64: i (i32), u (u32) or f (f32)
     #[arg(long, value_name = "i,f,...")]
     pub columns: String,
     /// The rows, .npy or .csv

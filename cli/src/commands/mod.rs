@@ -7,3 +7,4 @@ pub mod eval;
 pub mod lint;
 pub mod list;
 pub mod render;
+pub mod stress;

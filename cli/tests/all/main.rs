@@ -10,4 +10,5 @@ mod frozen;
 mod lint;
 mod list;
 mod render;
+mod stress;
 mod usage;

@@ -29,10 +29,11 @@ fn bump<const N: usize>(radius: f64, d: [f64; N], g: [f64; N]) -> (f64, [f64; N]
 fn simplex_2d(cell: [i32; 2], frac: [f64; 2], period: Option<[i32; 2]>, seed: u32) -> [f64; 3] {
     let p = split_2d(cell, frac);
     let home = |corner: [i32; 2]| period.map_or(corner, |[x, y]| wrap_2d(corner, [x, y + (y & 1)]));
+    let base = home(p.cell);
     let mut sum = [0.0; 3];
     for row in -2..=3 {
         for column in -2..=4 {
-            let corner = [p.cell[0].wrapping_add(column), p.cell[1].wrapping_add(row)];
+            let corner = [base[0].wrapping_add(column), base[1].wrapping_add(row)];
             // Odd rows lie half a cell to the left.
             let shift = if corner[1] & 1 == 1 { 0.5 } else { 0.0 };
             let d = [
@@ -52,10 +53,11 @@ fn simplex_2d(cell: [i32; 2], frac: [f64; 2], period: Option<[i32; 2]>, seed: u3
 fn simplex_3d(cell: [i32; 3], frac: [f64; 3], period: Option<[i32; 3]>, seed: u32) -> [f64; 4] {
     let p = split_3d(cell, frac);
     let home = |corner: [i32; 3]| period.map_or(corner, |size| wrap_3d(corner, size));
+    let base = home(p.cell);
     let mut sum = [0.0; 4];
     for index in 0..4_i32.pow(3) {
         let offset: [i32; 3] = std::array::from_fn(|axis| (index >> (2 * axis) & 3) - 1);
-        let corner = std::array::from_fn(|axis| p.cell[axis].wrapping_add(offset[axis]));
+        let corner = std::array::from_fn(|axis| base[axis].wrapping_add(offset[axis]));
         for (place, seed) in [(0.0, seed), (0.5, seed.wrapping_add(CENTRES))] {
             let d = std::array::from_fn(|axis| p.frac[axis] - f64::from(offset[axis]) - place);
             if d.iter().map(|x: &f64| x * x).sum::<f64>() >= RADIUS_3D {

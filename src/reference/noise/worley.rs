@@ -70,9 +70,11 @@ pub fn nearest_points_2d(
     seed: u32,
 ) -> [Found<2>; 3] {
     let p = split_2d(cell, frac);
+    let home = |cell| period.map_or(cell, |size| wrap_2d(cell, size));
+    let base = home(p.cell);
     nearest_points(p.frac, reach, |offset| {
-        let there = std::array::from_fn(|axis| p.cell[axis].wrapping_add(offset[axis]));
-        cell_point_2d(period.map_or(there, |size| wrap_2d(there, size)), seed)
+        let there = std::array::from_fn(|axis| base[axis].wrapping_add(offset[axis]));
+        cell_point_2d(home(there), seed)
     })
 }
 
@@ -85,9 +87,11 @@ pub fn nearest_points_3d(
     seed: u32,
 ) -> [Found<3>; 3] {
     let p = split_3d(cell, frac);
+    let home = |cell| period.map_or(cell, |size| wrap_3d(cell, size));
+    let base = home(p.cell);
     nearest_points(p.frac, reach, |offset| {
-        let there = std::array::from_fn(|axis| p.cell[axis].wrapping_add(offset[axis]));
-        cell_point_3d(period.map_or(there, |size| wrap_3d(there, size)), seed)
+        let there = std::array::from_fn(|axis| base[axis].wrapping_add(offset[axis]));
+        cell_point_3d(home(there), seed)
     })
 }
 

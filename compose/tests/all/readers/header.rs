@@ -117,6 +117,7 @@ fn the_examples_of_the_documentation_are_read() {
         Some("Someone2020 eq. 1; departs: guarded; Other2021")
     );
     assert_eq!(header.monotone, ["a", "layer.bottom"]);
+    assert!(header.outside_undefined);
     let a = &header.domain("a").unwrap().interval;
     assert_eq!(a.lo, Bound::Number(-std::f64::consts::PI));
     assert_eq!((a.lo_open, a.hi_open), (false, true));
@@ -144,7 +145,9 @@ fn the_refused_examples_of_the_documentation_are_refused() {
 #[test]
 fn the_grammar_of_the_documentation_names_every_key() {
     let grammar = blocks(GRAMMAR, "ebnf");
-    for key in ["domain", "range", "error", "monotone", "source", "internal"] {
+    for key in [
+        "domain", "range", "error", "monotone", "outside", "source", "internal",
+    ] {
         assert!(grammar[0].contains(&format!("\n{key} ")), "{key}");
         assert!(grammar[0].contains(&format!("\"{key}\"")), "{key}");
     }
@@ -445,11 +448,12 @@ fn fault_in_the_other_lines() {
         (3, "source", 11, "`source` is empty"),
         (3, "monotone", 13, "the form is `monotone NAME`"),
         (3, "monotone h g", 16, "the form is `monotone NAME`"),
+        (3, "outside finite", 5, "the form is `outside undefined`"),
         (
             3,
             "soruce  ours",
             5,
-            "`soruce` is no key of a header: domain, range, error, monotone, source, internal are",
+            "`soruce` is no key of a header: domain, range, error, monotone, outside, source, internal are",
         ),
         (
             1,
@@ -490,4 +494,23 @@ fn fault_in_the_other_lines() {
         fault(3, "monotone g"),
         "k.wgsl:9:14: `g` is no parameter of `f`\n/// monotone g\n             ^\nnote: the parameters are h"
     );
+}
+
+#[test]
+fn structures_are_read_with_the_types_of_their_members() {
+    let text = "//! T\n//! source   s\n\nstruct Empty {}\n/// Doc.\nstruct Layer {\n    /// The bottom [m], {not a brace}.\n    \
+                @size(16) bottom: f32,\n    cell : vec3 < i32 > , // the last\n    both: array<vec2f, 2>\n}\n";
+    let structs = parse_headers("k.wgsl", text).unwrap().structs;
+    let names: Vec<&str> = structs.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(names, ["Empty", "Layer"]);
+    let members: Vec<String> = structs[1]
+        .members
+        .iter()
+        .map(|m| format!("{}: {}", m.name, m.ty))
+        .collect();
+    assert_eq!(
+        members,
+        ["bottom: f32", "cell: vec3<i32>", "both: array<vec2f,2>"]
+    );
+    assert!(structs[0].members.is_empty());
 }
