@@ -92,6 +92,9 @@ pub struct Finding {
     pub seconds: f64,
 }
 
+/// Sets of arguments near a jump that are tried at most, beside those in which one is moved.
+const TURNS: usize = 4000;
+
 /// The most faults of a kind that are kept.
 const MOST_FAULTS: usize = 3;
 
@@ -504,13 +507,21 @@ impl<'a> Work<'a> {
             .collect();
         let mut random = Random(self.seed);
         let mut moved = row.to_vec();
+        // Widens the hull by the twin of other arguments; true when the device's result lies within.
         let mut include = |moved: &[u32]| {
             for (end, v) in hull.iter_mut().zip(self.entry.call(moved).get()) {
                 *end = (end.0.min(*v), end.1.max(*v));
             }
+            device
+                .iter()
+                .zip(&hull)
+                .zip(&self.judged)
+                .all(|((d, (lo, hi)), judged)| {
+                    !judged || distance(error.kind, *d, d.clamp(*lo, *hi)) <= error.value
+                })
         };
         include(row);
-        for turn in 0..(4 * floats.len() + 64) {
+        for turn in 0..(4 * floats.len() + TURNS) {
             moved.copy_from_slice(row);
             let shift = |x: f32, by: f64| (f64::from(x) + by * f64::from(x).abs().max(1.0)) as f32;
             if turn < 4 * floats.len() {
@@ -531,15 +542,11 @@ impl<'a> Work<'a> {
                     moved[*k] = shift(f32::from_bits(row[*k]), by).to_bits();
                 }
             }
-            include(&moved);
+            if include(&moved) {
+                return true;
+            }
         }
-        device
-            .iter()
-            .zip(hull)
-            .zip(&self.judged)
-            .all(|((d, (lo, hi)), judged)| {
-                !judged || distance(error.kind, *d, d.clamp(lo, hi)) <= error.value
-            })
+        false
     }
 
     fn judge_sweep(&mut self, rows: &[u32], bits: &[u32]) {

@@ -283,6 +283,28 @@ impl Samples {
         }
     }
 
+    /// A row on one of the ends of every second argument's domain: sums and products are largest there.
+    fn on_ends(&self, random: &mut Random, row: &mut [u32]) {
+        let mut at_end = false;
+        for k in 0..self.columns.len() {
+            let argument = |k: usize| self.names[k].split('.').next();
+            if k == 0 || argument(k) != argument(k - 1) {
+                at_end = random.bits().is_multiple_of(2);
+            }
+            let (lo, hi) = self.ends(k, row);
+            row[k] = if at_end {
+                let end = if random.bits().is_multiple_of(2) {
+                    lo
+                } else {
+                    hi
+                };
+                self.columns[k].bits(end, lo, hi)
+            } else {
+                self.columns[k].random(random, lo, hi)
+            };
+        }
+    }
+
     /// Writes the `index`-th row of a kind.
     pub fn row(&self, random: &mut Random, kind: Kind, index: u64, row: &mut [u32]) {
         match (kind, self.combinations) {
@@ -299,6 +321,8 @@ impl Samples {
                     }
                 }
             }
+            // A third of them lies on the ends of some arguments' domains, and anywhere in the others'.
+            (Kind::Adversarial, _) if random.below(3) == 0 => self.on_ends(random, row),
             (Kind::Adversarial, _) => {
                 let share = [0.2, 0.5, 0.9][random.below(3)];
                 self.within(random, row, share);

@@ -515,12 +515,12 @@ impl Entry {
         self
     }
 
-    /// The domains of a terrain that the promises of errors are for: mountains of up to 1400 m.
+    /// The domains of a terrain that the promises of errors are for: mountains of 1 m to 1400 m.
     fn terrain(self) -> Entry {
         self.lin("terrain.cell", -2_147_483_648.0, 2_147_483_647.0)
             .lin("terrain.frac", 0.0, 1.0)
             .log("terrain.wavelength", 8192.0, 65536.0)
-            .lin("terrain.amplitude", 0.0, 1400.0)
+            .lin("terrain.amplitude", 1.0, 1400.0)
             .lin("terrain.hurst", 1.0, 2.0)
             .lin("terrain.gain", 0.0, 2.0)
             .lin("terrain.smoothness", 0.0, 1.0)
@@ -1321,7 +1321,7 @@ fn particular(entry: Entry) -> Entry {
             .unit("dir")
             .lin("max_steps", 0.0, FEW_STEPS)
             .judged(&["distance"])
-            .jumps("grazing rays, the last step", 1e-6)
+            .jumps("grazing rays, the last step", 3e-5)
             .weight(500.0),
         ("terrain::march", "march") => entry
             .terrain()
@@ -1329,7 +1329,7 @@ fn particular(entry: Entry) -> Entry {
             .unit("dir")
             .lin("max_steps", 0.0, FEW_STEPS)
             .judged(&["distance"])
-            .jumps("grazing rays, the last step", 1e-6)
+            .jumps("grazing rays, the last step", 3e-5)
             .weight(500.0),
         ("terrain::normal", "terrain_normal" | "local_normal" | "terrain_slope") => {
             entry.terrain().weight(60.0)
@@ -1342,7 +1342,7 @@ fn particular(entry: Entry) -> Entry {
             .unit("to_sun")
             .lin("max_steps", 0.0, FEW_STEPS)
             .judged(&["light"])
-            .jumps("grazing rays, the last step", 1e-6)
+            .jumps("grazing rays, the last step", 3e-5)
             .weight(500.0),
         ("terrain::shading", "bounce_direction") => entry.unit("to_sun").branch("to_sun", &[1e-5]),
         ("terrain::shading", _) => entry.unit("normal").unit("to_sun"),
