@@ -107,28 +107,35 @@ impl Gauge {
     /// # Errors
     /// Faults of the device.
     pub fn speed(&self) -> Result<Speed, CliError> {
+        let hashes = 16.0 * f64::from(HASHES);
         Ok(Speed {
-            chain: rate(&self.chain)?,
-            side_by_side: rate(&self.side_by_side)?,
+            chain: rate(&self.chain, hashes)?,
+            side_by_side: rate(&self.side_by_side, hashes)?,
         })
     }
 }
 
-/// Millions of hashes a second, from the times of a short and of a long run, so that what a run costs by itself cancels.
-fn rate(loops: &Evaluator) -> Result<f64, CliError> {
+/// Millions of evaluations a second of an expression whose rows take `evaluations` each: of processor time where the
+/// system tells it. From the times of a short and of a long run, so that what a run costs by itself cancels.
+///
+/// # Errors
+/// Faults of the device.
+pub fn rate(expression: &Evaluator, evaluations: f64) -> Result<f64, CliError> {
     let time = |rows: u32| -> Result<f64, CliError> {
         let rows: Vec<u32> = (0..rows).collect();
         let (cpu, wall) = (CpuTime::now(), Instant::now());
-        loops.run_bits(&rows)?;
+        expression.run_bits(&rows)?;
         Ok(match (cpu, CpuTime::now()) {
             (Some(before), Some(after)) => after.since(&before),
             _ => wall.elapsed().as_secs_f64() * 1e3,
         })
     };
-    let (few, many) = (1 << 8, 1 << 15);
+    // About 2^28 evaluations, and no single submission that runs long on a slow device.
+    let many = ((2.0_f64.powi(28) / evaluations) as u32).clamp(1 << 10, 1 << 16);
+    let few = many >> 7;
     time(few)?;
     let spent = time(many)? - time(few)?;
-    Ok(f64::from(many - few) * f64::from(16 * HASHES) / spent.max(1e-3) / 1e3)
+    Ok(f64::from(many - few) * evaluations / spent.max(1e-3) / 1e3)
 }
 
 /// A round: the machine's speed, and a frame of each subject [ms].

@@ -204,6 +204,61 @@ pub fn markdown(bench: &Bench, plan: &Plan, entries: &[Entry], command: &str) ->
     text
 }
 
+/// How far the ratios that are conclusive in this run and in an earlier one (its JSON) are apart.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Repeatability {
+    /// Ratios that are conclusive in both.
+    pub both: usize,
+    /// Those of them that differ by more than 10 %.
+    pub apart: usize,
+    /// The largest relative difference.
+    pub largest: f64,
+}
+
+/// Compares with the JSON of an earlier run; entries that it lacks are passed over.
+pub fn compare(entries: &[Entry], earlier: &serde_json::Value) -> Repeatability {
+    let mut found = Repeatability::default();
+    let list = earlier.as_array().map_or(&[][..], Vec::as_slice);
+    for entry in entries {
+        let Some(before) = list
+            .iter()
+            .find(|e| e["preset"] == entry.preset.as_str() && e["view"] == entry.view.as_str())
+        else {
+            continue;
+        };
+        let ratios = [
+            ("thesis", "to_thesis", entry.to_thesis),
+            ("thesis_skip", "to_thesis_skip", entry.to_skip),
+        ];
+        for (base, name, now) in ratios {
+            let old = &before[name];
+            let (Some(median), Some(true)) = (old["median"].as_f64(), old["conclusive"].as_bool())
+            else {
+                continue;
+            };
+            if entry.preset == base || !now.conclusive() || median <= 0.0 {
+                continue;
+            }
+            let difference = (now.median / median - 1.0).abs();
+            found.both += 1;
+            found.apart += usize::from(difference > 0.1);
+            found.largest = found.largest.max(difference);
+        }
+    }
+    found
+}
+
+/// The comparison as a section of the document.
+pub fn repeatability(entries: &[Entry], earlier: &serde_json::Value) -> String {
+    let found = compare(entries, earlier);
+    format!(
+        "\n## Against an earlier run\n\nOf {} ratios that are conclusive in both runs, {} differ by more than 10 %; the largest difference is {:.1} %.\n",
+        found.both,
+        found.apart,
+        100.0 * found.largest
+    )
+}
+
 /// The same as JSON.
 pub fn to_json(entries: &[Entry]) -> serde_json::Value {
     let ratio = |r: Ratio| json!({ "median": r.median, "uncertainty": r.uncertainty, "conclusive": r.conclusive() });

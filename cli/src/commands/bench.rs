@@ -6,9 +6,9 @@ use indicatif::ProgressBar;
 
 use crate::bench::knob::{self, Effect, Knob};
 use crate::bench::timing::{Clock, Rounds};
-use crate::bench::{Bench, baseline, chapter6, presets, write_text};
+use crate::bench::{Bench, baseline, chapter6, noise, presets, write_text};
 use crate::catalog::{Catalog, SourceArgs};
-use crate::commands::render::{RenderArgs, write_json};
+use crate::commands::render::{RenderArgs, read_json, write_json};
 use crate::error::CliError;
 use crate::render::Size;
 
@@ -23,6 +23,8 @@ pub enum Subject {
     Knob,
     /// One frame of the frozen baseline, and how fast the machine is meanwhile.
     Baseline,
+    /// Throughput of the noises.
+    Noise,
 }
 
 /// Arguments of `veduta bench`.
@@ -71,9 +73,12 @@ pub struct BenchArgs {
     /// What is measured; processor time on a device in software, else timestamps, else wall time
     #[arg(long, value_enum)]
     pub clock: Option<Clock>,
-    /// A file (presets, baseline) or a folder (chapter6, knob) for the results; the table goes to stdout as well
+    /// A file (presets, baseline, noise) or a folder (chapter6, knob) for the results; the table goes to stdout as well
     #[arg(long, value_name = "PATH")]
     pub out: Option<PathBuf>,
+    /// The JSON file of an earlier run of presets, whose ratios are compared with the new ones
+    #[arg(long, value_name = "FILE")]
+    pub against: Option<PathBuf>,
     /// A folder for converged pictures, which later runs take from there
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
@@ -119,7 +124,10 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
             ));
         }
         (None, Some(_)) => Subject::Knob,
-        (Some(Subject::Presets | Subject::Chapter6 | Subject::Baseline), Some(knob)) => {
+        (
+            Some(Subject::Presets | Subject::Chapter6 | Subject::Baseline | Subject::Noise),
+            Some(knob),
+        ) => {
             return Err(CliError::argument(
                 "--knob",
                 knob.as_str(),
@@ -158,6 +166,18 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
         },
     };
     let command = args.command(subject);
+    // Before the long work: a file that cannot be read is told at once.
+    let earlier = match (&args.against, subject) {
+        (None, _) => None,
+        (Some(path), Subject::Presets) => Some(read_json(path)?),
+        (Some(path), _) => {
+            return Err(CliError::argument(
+                "--against",
+                path.display().to_string(),
+                "left out, or the subject `presets`",
+            ));
+        }
+    };
     let bar = ProgressBar::new_spinner();
     let mut progress = |what: &str| {
         bar.set_message(what.to_owned());
@@ -175,7 +195,10 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
             };
             let entries = presets::run(&bench, &plan, &mut progress)?;
             bar.finish_and_clear();
-            let text = presets::markdown(&bench, &plan, &entries, &command);
+            let mut text = presets::markdown(&bench, &plan, &entries, &command);
+            if let Some(earlier) = &earlier {
+                text += &presets::repeatability(&entries, earlier);
+            }
             print!("{text}");
             if let Some(path) = &args.out {
                 write_text(path, &text)?;
@@ -189,6 +212,16 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
             print!("{text}");
             if let Some(path) = &args.out {
                 write_text(path, &text)?;
+            }
+        }
+        Subject::Noise => {
+            let rounds = noise::run(&bench, rounds.least, &mut progress)?;
+            bar.finish_and_clear();
+            let text = noise::markdown(&bench, &rounds, &command);
+            print!("{text}");
+            if let Some(path) = &args.out {
+                write_text(path, &text)?;
+                write_json(&path.with_extension("json"), &noise::to_json(&rounds))?;
             }
         }
         Subject::Chapter6 => {

@@ -310,6 +310,12 @@ pub(crate) fn write_json(path: &Path, value: &serde_json::Value) -> Result<(), C
     std::fs::write(path, format!("{value:#}\n")).map_err(|e| CliError::write(path, e))
 }
 
+/// Reads a JSON file.
+pub(crate) fn read_json(path: &Path) -> Result<serde_json::Value, CliError> {
+    let text = std::fs::read_to_string(path).map_err(|e| CliError::read(path, e))?;
+    serde_json::from_str(&text).map_err(|e| CliError::read(path, e.into()))
+}
+
 fn ms(duration: std::time::Duration) -> f64 {
     duration.as_secs_f64() * 1e3
 }

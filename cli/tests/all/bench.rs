@@ -171,7 +171,21 @@ fn presets_are_compared_with_the_baseline_and_references_are_kept() {
     for part in ["llvm", "## `thesis_low`", "| V08 ", "time / thesis_skip"] {
         assert!(text.to_lowercase().contains(&part.to_lowercase()), "{part}");
     }
-    assert_eq!(presets::to_json(&entries).as_array().unwrap().len(), 3);
+    let mut earlier = presets::to_json(&entries);
+    assert_eq!(earlier.as_array().unwrap().len(), 3);
+    // Against itself nothing differs; a ratio that was another, and surely so, does.
+    let same = presets::compare(&entries, &earlier);
+    assert_eq!((same.apart, same.largest), (0, 0.0));
+    let mut sure = entries.clone();
+    sure[2].to_thesis.uncertainty = 0.0;
+    earlier[2]["to_thesis"] =
+        serde_json::json!({ "median": 1.25 * sure[2].to_thesis.median, "conclusive": true });
+    let other = presets::compare(&sure, &earlier);
+    assert!(
+        other.apart == 1 && (other.largest - 0.2).abs() < 1e-9,
+        "{other:?}"
+    );
+    assert!(presets::repeatability(&sure, &earlier).contains("1 differ"));
 }
 
 #[test]
@@ -286,6 +300,21 @@ fn the_baseline_is_measured_beside_the_machine() {
     ] {
         assert!(text.contains(part), "{part}\n{text}");
     }
+    veduta(
+        &dir,
+        &["bench", "noise", "--rounds", "1", "--out", "noise.md"],
+    )
+    .good();
+    let noises = json(&dir.join("noise.json"));
+    let noises = noises.as_array().unwrap();
+    assert!(noises.len() >= 8);
+    assert!(
+        noises
+            .iter()
+            .all(|n| n["measured"].as_f64().unwrap() > 0.01),
+        "{noises:?}"
+    );
+    veduta(&dir, &["bench", "noise", "--against", "noise.json"]).bad(1, &["--against", "presets"]);
     // At half the speed a frame counts half.
     let round = baseline::Round {
         speed: baseline::Speed {
