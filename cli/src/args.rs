@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands;
 
-/// Outdoor landscapes for wgpu: render, compose, lint, list, bench, cost, stress, eval.
+/// Outdoor landscapes for wgpu: render, compose, lint, list, bench, cost, stress, diff, eval.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "veduta", version, about, arg_required_else_help = true)]
 pub struct Args {
@@ -31,6 +31,8 @@ pub enum Command {
     Cost(commands::cost::CostArgs),
     /// Try adversarial inputs on every public function and every effect
     Stress(commands::stress::StressArgs),
+    /// Compare two pictures: PSNR, FLIP, relative RMSE, worst pixel
+    Diff(commands::diff::DiffArgs),
     /// Evaluate a WGSL expression over rows of numbers on the device
     Eval(commands::eval::EvalArgs),
 }
@@ -49,6 +51,7 @@ impl Args {
             Command::Bench(args) => commands::bench::run(args),
             Command::Cost(args) => commands::cost::run(args),
             Command::Stress(args) => commands::stress::run(args),
+            Command::Diff(args) => commands::diff::run(args),
             Command::Eval(args) => commands::eval::run(args),
         }
     }

@@ -1,7 +1,7 @@
 //! Pictures as files: 8-bit PNG and linear OpenEXR.
 
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 
 use crate::error::CliError;
@@ -39,6 +39,62 @@ pub fn write_exr(path: &Path, width: u32, height: u32, rgb: &[f32]) -> Result<()
         (rgb[at], rgb[at + 1], rgb[at + 2])
     })
     .map_err(|e| CliError::write(path, e))
+}
+
+/// Width, height and 8-bit RGB of a PNG; grey becomes three equal channels, an alpha channel is left out, 16 bits lose the
+/// lower ones.
+///
+/// # Errors
+/// [`CliError::Read`] for a file that cannot be read or is no PNG.
+pub fn read_png(path: &Path) -> Result<(usize, usize, Vec<u8>), CliError> {
+    let fault = |e: png::DecodingError| CliError::read(path, std::io::Error::other(e));
+    let file = File::open(path).map_err(|e| CliError::read(path, e))?;
+    let mut decoder = png::Decoder::new(BufReader::new(file));
+    decoder.set_transformations(png::Transformations::normalize_to_color8());
+    let mut reader = decoder.read_info().map_err(fault)?;
+    let size = reader
+        .output_buffer_size()
+        .ok_or_else(|| CliError::read(path, std::io::Error::other("the picture is too large")))?;
+    let mut bytes = vec![0; size];
+    let frame = reader.next_frame(&mut bytes).map_err(fault)?;
+    let channels = frame.color_type.samples();
+    let rgb = bytes
+        .get(..frame.buffer_size())
+        .unwrap_or(&bytes)
+        .chunks_exact(channels)
+        .flat_map(|p| {
+            if channels < 3 {
+                [p[0]; 3]
+            } else {
+                [p[0], p[1], p[2]]
+            }
+        })
+        .collect();
+    Ok((frame.width as usize, frame.height as usize, rgb))
+}
+
+/// Width, height and linear RGB of the first layer of an OpenEXR file that has these channels.
+///
+/// # Errors
+/// [`CliError::Read`] for a file that cannot be read or has no such layer.
+pub fn read_exr(path: &Path) -> Result<(usize, usize, Vec<f32>), CliError> {
+    let image = exr::prelude::read_first_rgba_layer_from_file(
+        path,
+        |size, _| (size.width(), vec![0.0; 3 * size.width() * size.height()]),
+        |(width, rgb): &mut (usize, Vec<f32>), at, (r, g, b, _): (f32, f32, f32, f32)| {
+            let first = 3 * (at.y() * *width + at.x());
+            if let Some(pixel) = rgb.get_mut(first..first + 3) {
+                pixel.copy_from_slice(&[r, g, b]);
+            }
+        },
+    )
+    .map_err(|e| CliError::read(path, std::io::Error::other(e.to_string())))?;
+    let size = image.layer_data.size;
+    Ok((
+        size.width(),
+        size.height(),
+        image.layer_data.channel_data.pixels.1,
+    ))
 }
 
 /// The path of frame `number`: `picture.png` becomes `picture_0007.png`.

@@ -111,30 +111,57 @@ impl Picture {
                 format!("{}x{} as its reference", reference.width, reference.height),
             ));
         }
-        let (shown, wanted) = (self.display(exposure), reference.display(exposure));
+        Ok(Difference::of_display(
+            self.width,
+            self.height,
+            &self.display(exposure),
+            &reference.display(exposure),
+            relative_rmse(&self.rgb, &reference.rgb),
+        ))
+    }
+}
+
+impl Difference {
+    /// Of two 8-bit RGB pictures of `width` x `height` pixels, and a relative RMSE that is known.
+    pub fn of_display(
+        width: usize,
+        height: usize,
+        shown: &[u8],
+        wanted: &[u8],
+        relative_rmse: f64,
+    ) -> Difference {
         let mut worst = Worst {
             x: 0,
             y: 0,
             steps: 0,
         };
-        for (i, (a, b)) in shown.iter().zip(&wanted).enumerate() {
+        for (i, (a, b)) in shown.iter().zip(wanted).enumerate() {
             let steps = a.abs_diff(*b);
             if steps > worst.steps {
                 let pixel = i / 3;
                 worst = Worst {
-                    x: pixel % self.width,
-                    y: pixel / self.width,
+                    x: pixel % width.max(1),
+                    y: pixel / width.max(1),
                     steps,
                 };
             }
         }
-        Ok(Difference {
-            psnr: psnr(&shown, &wanted),
-            relative_rmse: relative_rmse(&self.rgb, &reference.rgb),
-            flip: flip(&wanted, &shown, self.width, self.height),
+        Difference {
+            psnr: psnr(shown, wanted),
+            relative_rmse,
+            flip: flip(wanted, shown, width, height),
             worst,
-        })
+        }
     }
+}
+
+/// Eight times the difference of 8-bit pictures around middle grey.
+pub fn amplified(shown: &[u8], wanted: &[u8]) -> Vec<u8> {
+    shown
+        .iter()
+        .zip(wanted)
+        .map(|(a, b)| (128 + 8 * (i32::from(*a) - i32::from(*b))).clamp(0, 255) as u8)
+        .collect()
 }
 
 /// Peak signal-to-noise ratio of 8-bit values in dB, of the mean square difference over all channels; infinite for equal

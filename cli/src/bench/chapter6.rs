@@ -12,7 +12,7 @@ use super::{Bench, decibels, side_by_side, table, write_text};
 use crate::commands::render::write_json;
 use crate::error::CliError;
 use crate::image::write_png;
-use crate::metrics::{Difference, Picture};
+use crate::metrics::{Difference, Picture, amplified};
 
 /// Steps along the view ray.
 pub const PRIMARY: [i64; 5] = [16, 32, 64, 128, 512];
@@ -218,7 +218,7 @@ pub fn run(
         });
         shown.extend([off.display(exposure), on.display(exposure)]);
         let magnified: Vec<Vec<u8>> = [&off, &on]
-            .map(|p| amplified(p, &reference, exposure))
+            .map(|p| amplified(&p.display(exposure), &reference.display(exposure)))
             .into();
         let (w, h, rgb) = side_by_side(&magnified, width, height);
         write_png(&folder.join(format!("jitter_{p}_error_x8.png")), w, h, &rgb)?;
@@ -231,16 +231,6 @@ pub fn run(
         sweep,
         jitter,
     })
-}
-
-/// Eight times the difference of the 8-bit pictures around middle grey.
-fn amplified(picture: &Picture, reference: &Picture, exposure: f64) -> Vec<u8> {
-    picture
-        .display(exposure)
-        .iter()
-        .zip(reference.display(exposure))
-        .map(|(a, b)| (128 + 8 * (i32::from(*a) - i32::from(b))).clamp(0, 255) as u8)
-        .collect()
 }
 
 /// The tables of a report.

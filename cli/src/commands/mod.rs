@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod compose;
 pub mod cost;
+pub mod diff;
 pub mod eval;
 pub mod lint;
 pub mod list;

@@ -116,9 +116,12 @@ fn every_effect_has_a_converged_picture() {
             // The terrain's own knobs move where rays hit; the air has an f64 reference.
             assert_eq!(entry.depth.is_some(), effect == Effect::Terrain);
             assert_eq!(entry.to_truth.is_some(), effect == Effect::Atmosphere);
-            if let Some(depth) = &entry.depth {
-                assert!(depth.both > 200 && depth.percentile_99 < 0.5, "{depth:?}");
-            }
+        }
+        if let [Some(few), Some(many)] = [0, 1].map(|k| report.entries[k].depth) {
+            // Ten octaves are those of the converged terrain, six another ground.
+            println!("6 octaves {few:?}, 10 {many:?}");
+            assert!(many.both > 200 && many.median < 1e-3 && many.percentile_99 < 0.05);
+            assert!(few.flips > many.flips && few.median > 4.0 * many.median);
         }
         if let [Some(few), Some(many)] = [0, 1].map(|k| report.entries[k].to_truth) {
             println!("8 and 16 steps are {few:.5} and {many:.5} from the f64 reference");
