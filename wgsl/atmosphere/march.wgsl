@@ -74,7 +74,7 @@ fn air_column(atmosphere: Atmosphere, h: f32, mu: f32, steps: i32) -> vec2<f32> 
 /// domain  mu in [-1, 1] 1 lin
 /// domain  steps in [1, 512] 1 lin
 /// range   [0, 1] 1
-/// error   2e-6 abs of reference::atmosphere::sun_transmittance
+/// error   3e-6 abs of reference::atmosphere::sun_transmittance
 /// outside undefined
 /// source  Leitner2022 eq. 3.1 along the path to the sun
 fn sun_transmittance(atmosphere: Atmosphere, h: f32, mu: f32, steps: i32) -> vec3<f32> {
@@ -93,7 +93,7 @@ fn sun_transmittance(atmosphere: Atmosphere, h: f32, mu: f32, steps: i32) -> vec
 /// domain  steps in [1, 1024] 1 lin
 /// domain  light_steps in [1, 512] 1 lin
 /// range   [0, 100] 1/sr
-/// error   2e-5 abs of reference::atmosphere::march_sky
+/// error   3e-5 abs of reference::atmosphere::march_sky
 /// outside undefined
 /// source  Leitner2022 alg. 7; departs: half a step less attenuation, planet shadow
 fn march_sky(atmosphere: Atmosphere, eye_altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, distance: f32, steps: i32, light_steps: i32) -> SkyLight {

@@ -46,7 +46,7 @@ fn layer_exit(layer: CloudLayer, ground_radius: f32, altitude: f32, mu: f32) -> 
 /// domain  mu in [-1, 1] 1 lin
 /// domain  steps in [1, 64] 1 lin
 /// range   [0, 8e4] 1
-/// error   5e-3 rel of reference::clouds::sun_depth
+/// error   1e-2 rel of reference::clouds::sun_depth
 /// outside undefined
 /// source  Leitner2022 ch. 4.5 (secondary march)
 fn sun_depth(layer: CloudLayer, ground_radius: f32, relative: vec3<f32>, altitude: f32, to_sun: vec3<f32>, mu: f32, steps: i32) -> f32 {

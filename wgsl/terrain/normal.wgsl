@@ -13,7 +13,7 @@
 /// domain  step in [1, 1000] m log
 /// domain  octaves in [1, 16] 1 lin
 /// range   [-1e4, 1e4] 1
-/// error   3e-3 abs of reference::terrain::terrain_slope
+/// error   6e-3 abs of reference::terrain::terrain_slope
 /// outside undefined
 /// source  Leitner2022 listing 5.3
 fn terrain_slope(terrain: Terrain, offset: vec2<f32>, step: f32, octaves: i32) -> vec2<f32> {

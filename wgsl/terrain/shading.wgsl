@@ -32,7 +32,7 @@ fn bounce_direction(to_sun: vec3<f32>) -> vec3<f32> {
 /// domain  lights.sky_color in [0, 10] 1 lin
 /// domain  lights.bounce_color in [0, 10] 1 lin
 /// range   [0, 30] 1
-/// error   3e-6 abs of reference::terrain::shade_three_lights
+/// error   5e-6 abs of reference::terrain::shade_three_lights
 /// outside undefined
 /// source  Leitner2022 eq. 4.1; departs: clamped at 0
 fn shade_three_lights(lights: ThreeLights, normal: vec3<f32>, to_sun: vec3<f32>, shadow: f32) -> vec3<f32> {
