@@ -179,14 +179,26 @@ pub fn psnr(a: &[u8], b: &[u8]) -> f64 {
 }
 
 /// Root mean square difference over the root mean square of the reference; 0 over 0 is 0.
+///
+/// Both are cut at 16 times the value that 1 % of the reference exceed: a pixel of the sun's disc, ten thousand times as bright
+/// as the sky, would otherwise outweigh all others.
 pub fn relative_rmse(a: &[f32], reference: &[f32]) -> f64 {
+    let mut sorted = reference.to_vec();
+    sorted.sort_by(f32::total_cmp);
+    let bright = sorted.get(sorted.len() * 99 / 100).copied().unwrap_or(0.0);
+    let limit = if bright > 0.0 {
+        16.0 * f64::from(bright)
+    } else {
+        f64::INFINITY
+    };
     let square = |x: f64| x * x;
+    let cut = |x: &f32| f64::from(*x).min(limit);
     let difference: f64 = a
         .iter()
         .zip(reference)
-        .map(|(a, r)| square(f64::from(*a) - f64::from(*r)))
+        .map(|(a, r)| square(cut(a) - cut(r)))
         .sum();
-    let size: f64 = reference.iter().map(|r| square(f64::from(*r))).sum();
+    let size: f64 = reference.iter().map(|r| square(cut(r))).sum();
     if difference == 0.0 {
         0.0
     } else {
@@ -294,6 +306,19 @@ mod tests {
         assert!((relative_rmse(&b, &a) - 0.01).abs() < 1e-6);
         assert_eq!(relative_rmse(&a, &a), 0.0);
         assert_eq!(relative_rmse(&[0.0], &[0.0]), 0.0);
+        assert_eq!(relative_rmse(&[1.0], &[0.0]), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_pixel_of_the_sun_does_not_outweigh_the_others() {
+        let reference = vec![1.0_f32; 3000];
+        let mut sun = reference.clone();
+        sun[7] = 1e5;
+        let mut dim = reference.clone();
+        dim.iter_mut().for_each(|v| *v *= 0.5);
+        // One of 3000 counts as 16: 15 / sqrt(3000).
+        assert!((relative_rmse(&sun, &reference) - 15.0 / 3000_f64.sqrt()).abs() < 1e-6);
+        assert!(relative_rmse(&dim, &reference) > relative_rmse(&sun, &reference));
         assert_eq!(relative_rmse(&[1.0], &[0.0]), f64::INFINITY);
     }
 

@@ -90,8 +90,8 @@ fn sun_transmittance(atmosphere: Atmosphere, h: f32, mu: f32, steps: i32) -> vec
 /// domain  dir in [-1, 1] 1 lin
 /// domain  to_sun in [-1, 1] 1 lin
 /// domain  distance in [0, 1e7] m lin
-/// domain  steps in [1, 1024] 1 lin
-/// domain  light_steps in [1, 512] 1 lin
+/// domain  steps in [1, 512] 1 lin
+/// domain  light_steps in [1, 64] 1 lin
 /// range   [0, 100] 1/sr
 /// error   3e-5 abs of reference::atmosphere::march_sky
 /// outside undefined

@@ -43,7 +43,7 @@ fn ray_clearance(terrain: Terrain, ground_radius: f32, eye_altitude: f32, dir: v
 /// domain  near in [0, 1e3] m lin
 /// domain  far in [1e3, 1e5] m lin
 /// domain  step in [1, 100] m log
-/// domain  max_steps in [0, 100000] 1 lin
+/// domain  max_steps in [0, 4000] 1 lin
 /// domain  octaves in [1, 16] 1 lin
 /// range   [-1, 1e5] m
 /// error   5e-3 abs of reference::terrain::march_constant
@@ -82,7 +82,7 @@ fn march_constant(terrain: Terrain, ground_radius: f32, eye_altitude: f32, dir: 
 /// domain  far in [1e3, 1e5] m lin
 /// domain  step_factor in [0.05, 1] 1 lin
 /// domain  epsilon in [0.01, 10] 1 log
-/// domain  max_steps in [0, 10000] 1 lin
+/// domain  max_steps in [0, 4000] 1 lin
 /// domain  octaves in [1, 16] 1 lin
 /// range   [-1, 1e5] m
 /// error   0.05 abs of reference::terrain::march

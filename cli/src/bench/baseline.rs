@@ -21,7 +21,7 @@ pub const AIM_SPEED: Speed = Speed {
     side_by_side: 3500.0,
 };
 
-/// The aim for one frame of the baseline [ms], give or take [`AIM_TOLERANCE`].
+/// The aim for one frame of the baseline in milliseconds, give or take [`AIM_TOLERANCE`].
 pub const AIM: f64 = 550.0;
 
 /// The share of [`AIM`] that a frame may miss it by.
@@ -138,7 +138,7 @@ pub fn rate(expression: &Evaluator, evaluations: f64) -> Result<f64, CliError> {
     Ok(f64::from(many - few) * evaluations / spent.max(1e-3) / 1e3)
 }
 
-/// A round: the machine's speed, and a frame of each subject [ms].
+/// A round: the machine's speed, and a frame of each subject in milliseconds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Round {
     /// The speed of this moment.
@@ -152,7 +152,7 @@ pub struct Round {
 }
 
 impl Round {
-    /// What the frame would have cost at the speed of the aim [ms], by the chain and by the four chains.
+    /// What the frame would have cost at the speed of the aim in milliseconds, by the chain and by the four chains.
     pub fn at_the_speed_of_the_aim(&self) -> (f64, f64) {
         (
             self.thesis * self.speed.chain / AIM_SPEED.chain,

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use serde_json::json;
+use veduta::program::{KeyKind, SceneTable};
 use veduta::{ProgramSet, Value};
 
 use super::plot::{Plot, Series};
-use super::timing::{Middle, Ratio, Rounds, in_turns};
+use super::timing::{Middle, Ratio, Rounds, beside_bases};
 use super::truth::Truth;
 use super::{Bench, JUDGED, judged_cells, judged_json, pareto, side_by_side, table, write_text};
 use crate::commands::render::{Job, write_json};
@@ -90,6 +91,14 @@ impl Knob {
         };
         let (name, list) = text.split_once('=').unwrap_or((text, "false,true"));
         let key = set.key(name.trim())?;
+        let named = |scene: &SceneTable| scene.features.iter().any(|f| **f == *key.name);
+        if key.kind != KeyKind::Quality || set.scenes.iter().any(named) {
+            return Err(CliError::argument(
+                "--knob",
+                name.trim(),
+                "a quality key that no scene names: content is no error",
+            ));
+        }
         let texts: Vec<String> = match list.split_once("..") {
             None => list.split(',').map(|t| t.trim().to_owned()).collect(),
             Some((from, to)) => {
@@ -116,7 +125,10 @@ impl Knob {
         let values = texts
             .iter()
             .map(|t| Ok(key.parse(t)?))
-            .collect::<Result<_, CliError>>()?;
+            .collect::<Result<Vec<_>, CliError>>()?;
+        if (1..values.len()).any(|k| values[..k].contains(&values[k])) {
+            return Err(CliError::argument("--knob", text, "each value once"));
+        }
         Ok(Knob {
             key: name.trim().to_owned(),
             values,
@@ -152,6 +164,8 @@ pub struct Report {
     pub entries: Vec<Entry>,
     /// 8-bit pictures of the settings, then of the reference.
     pub pictures: Vec<Vec<u8>>,
+    /// The view.
+    pub view: String,
     /// What the converged picture is.
     pub reference: String,
     /// The f64 reference, where there is one.
@@ -183,12 +197,19 @@ pub fn run(
     for value in &knob.values {
         jobs.push(job(&[(knob.key.as_str(), *value)])?);
     }
+    progress("counts");
+    let mut counts = Vec::new();
+    for (job, value) in jobs.iter().skip(1).zip(&knob.values) {
+        let pixel = job.operation_counts(&bench.gpu, bench.size, 0.0)?;
+        bench.check_loops(&format!("{}={value}", knob.key), &pixel)?;
+        counts.push(pixel);
+    }
     let mut subjects = jobs
         .iter()
         .map(|j| bench.subject(j, 0.0))
         .collect::<Result<Vec<_>, _>>()?;
     progress("times");
-    let times = in_turns(&mut subjects, &[0], bench.clock, rounds, &mut || {})?;
+    let turns = beside_bases(&mut subjects, &[0], bench.clock, rounds, &mut || {})?;
     drop(subjects);
     progress("f64 reference");
     let alone = |value: Option<&Value>| -> Result<Option<Job>, CliError> {
@@ -215,7 +236,6 @@ pub fn run(
         progress(&format!("{}={value}", knob.key));
         let job = &jobs[k + 1];
         let picture = bench.picture(job, 0.0, 1)?;
-        let counts = job.operation_counts(&bench.gpu, bench.size, 0.0)?;
         let to_truth = match (&truth, alone(Some(value))?) {
             (Some(truth), Some(job)) => Some(truth.relative_rmse(&bench.picture(&job, 0.0, 1)?)),
             _ => None,
@@ -228,9 +248,9 @@ pub fn run(
         };
         entries.push(Entry {
             value: *value,
-            time: Middle::of(&times[k + 1]),
-            ratio: Ratio::of(&times[k + 1], &times[0]),
-            counts: counts.map(|c| c.0),
+            time: Middle::of(&turns.times[k + 1]),
+            ratio: turns.ratio(k + 1, 0),
+            counts: counts[k].map(|c| c.0),
             difference: picture.difference(&reference, exposure)?,
             to_truth,
             depth,
@@ -241,7 +261,7 @@ pub fn run(
     pictures.push(reference.display(exposure));
     let points: Vec<(f64, f64)> = entries
         .iter()
-        .map(|e| (e.ratio.median, e.difference.relative_rmse))
+        .map(|e| (e.ratio.median, -e.difference.psnr))
         .collect();
     for k in pareto(&points) {
         entries[k].on_front = true;
@@ -253,6 +273,7 @@ pub fn run(
     Ok(Report {
         entries,
         pictures,
+        view: view.to_owned(),
         reference: format!(
             "{}, {} a pixel",
             values.join(" "),
@@ -273,7 +294,10 @@ pub fn markdown(bench: &Bench, knob: &Knob, report: &Report, command: &str) -> S
         knob.key,
         bench.machine()
     );
-    text += &format!("- reference: {}\n", report.reference);
+    text += &format!(
+        "- view: {}\n- reference: {}\n",
+        report.view, report.reference
+    );
     if let Some(truth) = &report.truth {
         text += &format!(
             "- f64: relative RMSE of the effect alone on {} rays of the sky from {}, whose own error it estimates at {:.1e}\n",
@@ -351,7 +375,11 @@ pub fn write(
             entry
         })
         .collect();
-    let document = json!({ "key": knob.key, "reference": report.reference, "entries": entries });
+    let mut document = bench.head(command);
+    document["key"] = knob.key.as_str().into();
+    document["view"] = report.view.as_str().into();
+    document["reference"] = report.reference.as_str().into();
+    document["entries"] = entries.into();
     write_json(&folder.join(format!("{name}.json")), &document)?;
     let points = |front: bool| -> Vec<(f64, f64, String)> {
         let mut list: Vec<&Entry> = report

@@ -150,6 +150,43 @@ impl Bench {
         job.settings.number("EXPOSURE").unwrap_or(1.0)
     }
 
+    /// Whether a driver that ends loops after 65,535 rounds (llvmpipe, over all loops of eight pixels) may cut a picture short.
+    /// `counts` are mean and maximum a pixel of noise, density, light and air samples; a sample is about a round, and the
+    /// six octaves of a cloud's density are none.
+    ///
+    /// # Errors
+    /// [`CliError::Argument`] that names `what` and the rounds that it takes.
+    pub fn check_loops(&self, what: &str, counts: &[(f64, f64); 4]) -> Result<(), CliError> {
+        const LIMIT: f64 = 65_535.0;
+        let [noise, density, light, air] = counts.map(|c| c.1);
+        let rounds = (noise - 6.0 * (density + light)).max(0.0) + density + light + air;
+        if self.gpu.adapter.get_info().name.contains("llvmpipe") && rounds > LIMIT {
+            return Err(CliError::argument(
+                "--knob",
+                format!("{what}, about {rounds:.0} rounds of loops in a pixel"),
+                format!(
+                    "at most {LIMIT:.0} on this driver, which ends all loops there and says nothing"
+                ),
+            ));
+        }
+        Ok(())
+    }
+
+    /// What was run on which machine, as the head of a JSON document.
+    pub fn head(&self, command: &str) -> serde_json::Value {
+        let info: wgpu::AdapterInfo = self.gpu.adapter.get_info();
+        serde_json::json!({
+            "command": command,
+            "adapter": info.name,
+            "backend": info.backend.to_string(),
+            "driver": info.driver,
+            "driver_info": info.driver_info,
+            "processor": processor(),
+            "clock": self.clock.describe(),
+            "size": [self.size.width, self.size.height],
+        })
+    }
+
     /// Device, driver, processor and clock, as lines of a document.
     pub fn machine(&self) -> String {
         format!(

@@ -188,13 +188,16 @@ pub fn markdown(bench: &Bench, rounds: &[Round], command: &str) -> String {
 }
 
 /// The same as JSON.
-pub fn to_json(rounds: &[Round]) -> serde_json::Value {
-    NOISES
+pub fn to_json(bench: &Bench, rounds: &[Round], command: &str) -> serde_json::Value {
+    let list: Vec<serde_json::Value> = NOISES
         .iter()
         .enumerate()
         .map(|(k, noise)| {
             let [measured, scaled, share] = medians(rounds, k);
             json!({ "noise": noise.import, "measured": measured, "scaled": scaled, "by_hand": noise.by_hand, "share": share })
         })
-        .collect()
+        .collect();
+    let mut document = bench.head(command);
+    document["noises"] = list.into();
+    document
 }

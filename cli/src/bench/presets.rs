@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::timing::{Middle, Ratio, Rounds, in_turns};
+use super::timing::{Middle, Ratio, Rounds, beside_bases};
 use super::{Bench, JUDGED, decibels, judged_cells, judged_json, table};
 use crate::error::CliError;
 use crate::metrics::Difference;
@@ -61,21 +61,26 @@ pub fn run(
             .map(String::as_str)
             .filter(|p| !BASES.contains(p)),
     );
-    let mut entries = Vec::new();
+    // All names before the long work: one that does not exist is told at once.
+    let mut work = Vec::new();
     for view in &plan.views {
-        progress(&format!("{view}: reference"));
         let converged = bench.job(&plan.scene, &plan.reference, view, &[])?;
-        let reference = bench.reference(&converged, 0.0, plan.samples)?;
         let jobs = presets
             .iter()
             .map(|preset| bench.job(&plan.scene, preset, view, &[]))
             .collect::<Result<Vec<_>, _>>()?;
+        work.push((view, converged, jobs));
+    }
+    let mut entries = Vec::new();
+    for (view, converged, jobs) in &work {
+        progress(&format!("{view}: reference"));
+        let reference = bench.reference(converged, 0.0, plan.samples)?;
         let mut subjects = jobs
             .iter()
             .map(|job| bench.subject(job, 0.0))
             .collect::<Result<Vec<_>, _>>()?;
         progress(&format!("{view}: times"));
-        let times = in_turns(&mut subjects, &[0, 1], bench.clock, plan.rounds, &mut || {})?;
+        let turns = beside_bases(&mut subjects, &[0, 1], bench.clock, plan.rounds, &mut || {})?;
         drop(subjects);
         progress(&format!("{view}: pictures"));
         for (k, job) in jobs.iter().enumerate() {
@@ -83,12 +88,12 @@ pub fn run(
             let counts = job.operation_counts(&bench.gpu, bench.size, 0.0)?;
             entries.push(Entry {
                 preset: presets[k].to_owned(),
-                view: view.clone(),
-                time: Middle::of(&times[k]),
-                to_thesis: Ratio::of(&times[k], &times[0]),
-                to_skip: Ratio::of(&times[k], &times[1]),
+                view: (*view).clone(),
+                time: Middle::of(&turns.times[k]),
+                to_thesis: turns.ratio(k, 0),
+                to_skip: turns.ratio(k, 1),
                 counts: counts.map(|c| c.0),
-                difference: picture.difference(&reference, bench.exposure(&converged))?,
+                difference: picture.difference(&reference, bench.exposure(converged))?,
             });
         }
     }
@@ -218,7 +223,7 @@ pub struct Repeatability {
 /// Compares with the JSON of an earlier run; entries that it lacks are passed over.
 pub fn compare(entries: &[Entry], earlier: &serde_json::Value) -> Repeatability {
     let mut found = Repeatability::default();
-    let list = earlier.as_array().map_or(&[][..], Vec::as_slice);
+    let list = earlier["entries"].as_array().map_or(&[][..], Vec::as_slice);
     for entry in entries {
         let Some(before) = list
             .iter()
@@ -260,9 +265,9 @@ pub fn repeatability(entries: &[Entry], earlier: &serde_json::Value) -> String {
 }
 
 /// The same as JSON.
-pub fn to_json(entries: &[Entry]) -> serde_json::Value {
+pub fn to_json(bench: &Bench, entries: &[Entry], command: &str) -> serde_json::Value {
     let ratio = |r: Ratio| json!({ "median": r.median, "uncertainty": r.uncertainty, "conclusive": r.conclusive() });
-    entries
+    let list: Vec<serde_json::Value> = entries
         .iter()
         .map(|e| {
             let mut entry = json!({
@@ -276,5 +281,8 @@ pub fn to_json(entries: &[Entry]) -> serde_json::Value {
             judged_json(&mut entry, &e.counts, &e.difference);
             entry
         })
-        .collect()
+        .collect();
+    let mut document = bench.head(command);
+    document["entries"] = list.into();
+    document
 }

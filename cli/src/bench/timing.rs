@@ -122,6 +122,89 @@ pub fn in_turns(
     Ok(times)
 }
 
+/// Times of subjects, each with its bases drawn right beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Turns {
+    /// `[subject][round]` milliseconds.
+    pub times: Vec<Vec<f64>>,
+    bases: Vec<usize>,
+    /// `[base][subject][round]` milliseconds of the base beside the subject.
+    beside: Vec<Vec<Vec<f64>>>,
+}
+
+impl Turns {
+    /// The ratio of a subject's times to those of a base beside it; 1 to itself, NaN to what was no base.
+    pub fn ratio(&self, subject: usize, base: usize) -> Ratio {
+        if subject == base {
+            return Ratio {
+                median: 1.0,
+                uncertainty: 0.0,
+            };
+        }
+        match (
+            self.bases.iter().position(|b| *b == base),
+            self.times.get(subject),
+        ) {
+            (Some(k), Some(times)) => Ratio::of(times, &self.beside[k][subject]),
+            _ => Ratio::of(&[], &[]),
+        }
+    }
+
+    fn settled(&self) -> bool {
+        (0..self.times.len())
+            .all(|k| (self.bases.iter()).all(|base| self.ratio(k, *base).conclusive()))
+    }
+}
+
+/// Draws every subject with each of the subjects `bases` right beside it: in the rounds in turns before and after it, so that
+/// a drift cancels, and what slows the machine for seconds slows both. Rounds follow until all ratios were conclusive after
+/// two rounds in succession, or there are as many as `rounds` allows.
+///
+/// # Errors
+/// Faults of the device.
+pub fn beside_bases(
+    subjects: &mut [Subject],
+    bases: &[usize],
+    clock: Clock,
+    rounds: Rounds,
+    progress: &mut dyn FnMut(),
+) -> Result<Turns, CliError> {
+    let count = subjects.len();
+    let mut turns = Turns {
+        times: vec![Vec::new(); count],
+        bases: bases.to_vec(),
+        beside: vec![vec![Vec::new(); count]; bases.len()],
+    };
+    for subject in subjects.iter_mut() {
+        subject.renderer.warm_up(&subject.view)?;
+    }
+    let mut settled_before = false;
+    for round in 0..rounds.most.max(rounds.least).max(1) {
+        let even = round % 2 == 0;
+        for turn in 0..count {
+            let k = if even { turn } else { count - 1 - turn };
+            if !even {
+                turns.times[k].push(subjects[k].draw(clock)?);
+            }
+            for (b, base) in bases.iter().enumerate() {
+                if *base != k {
+                    turns.beside[b][k].push(subjects[*base].draw(clock)?);
+                }
+            }
+            if even {
+                turns.times[k].push(subjects[k].draw(clock)?);
+            }
+            progress();
+        }
+        let settled = turns.settled();
+        if round + 1 >= rounds.least.max(1) && settled && settled_before {
+            break;
+        }
+        settled_before = settled;
+    }
+    Ok(turns)
+}
+
 /// The middle of values and how far they scatter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Middle {
@@ -159,8 +242,9 @@ pub struct Ratio {
     pub uncertainty: f64,
 }
 
-/// Above this relative uncertainty a ratio says nothing: three of them make the 10 % that two runs may differ by.
-pub const CONCLUSIVE: f64 = 0.033;
+/// Above this relative uncertainty a ratio says nothing: two runs differ by the root of two of it, and three times that is
+/// the 10 % that they may differ by.
+pub const CONCLUSIVE: f64 = 0.0235;
 
 impl Ratio {
     /// Round by round `times` over `base`.
@@ -230,7 +314,7 @@ mod tests {
 
     #[test]
     fn more_rounds_make_it_surer() {
-        // Scatter of 5 %: enough with many rounds, not with three.
+        // Scatter of 5 %: enough with many rounds, not with four.
         let noisy = |n: usize| -> Vec<f64> {
             (0..n)
                 .map(|i| 1.0 + 0.05 * ((i * 7919 % 13) as f64 / 6.0 - 1.0))

@@ -10,6 +10,7 @@ use crate::bench::{Bench, baseline, chapter6, noise, presets, write_text};
 use crate::catalog::{Catalog, SourceArgs};
 use crate::commands::render::{RenderArgs, read_json, write_json};
 use crate::error::CliError;
+use crate::image::check_folder;
 use crate::render::Size;
 
 /// What is measured.
@@ -32,28 +33,20 @@ pub enum Subject {
 pub struct BenchArgs {
     /// What to measure; `knob` when --knob is given
     pub subject: Option<Subject>,
-    /// What a knob belongs to: scene and converged picture follow from it
-    #[arg(long, value_enum, default_value = "all")]
-    pub effect: Effect,
+    /// What a knob belongs to, `all` when left out: scene and converged picture follow from it
+    #[arg(long, value_enum, requires = "knob")]
+    pub effect: Option<Effect>,
     /// A key and its values: KEY=8..256 (doubling), KEY=1,2,3, or a flag's name
     #[arg(long, value_name = "KEY=VALUES")]
     pub knob: Option<String>,
-    /// The preset whose knob is turned
-    #[arg(long, default_value = "thesis")]
-    pub preset: String,
-    /// Views, divided by commas; a knob takes the first
-    #[arg(
-        long,
-        value_delimiter = ',',
-        default_value = "V01,V02,V03,V04,V05,V06,V07,V08,V09,V10,V11,V12"
-    )]
+    /// The preset whose knob is turned [default: thesis]
+    #[arg(long, requires = "knob")]
+    pub preset: Option<String>,
+    /// Views of presets, divided by commas, or the one of a knob [default: V01 to V12; V01]
+    #[arg(long, value_delimiter = ',')]
     pub views: Vec<String>,
-    /// Presets beside `thesis` and `thesis_skip`, divided by commas
-    #[arg(
-        long,
-        value_delimiter = ',',
-        default_value = "thesis_low,low,medium,high"
-    )]
+    /// Presets beside `thesis` and `thesis_skip`, divided by commas [default: thesis_low,low,medium,high]
+    #[arg(long = "of", value_name = "PRESETS", value_delimiter = ',')]
     pub presets: Vec<String>,
     /// A value that holds everywhere; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -61,14 +54,14 @@ pub struct BenchArgs {
     /// Width and height in pixels [default: 256x144; presets 128x72]
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
-    /// Seconds of the flight of chapter 6
-    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=86_400))]
-    pub seconds: u32,
+    /// Seconds of the flight of chapter 6 [default: 60]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=86_400))]
+    pub seconds: Option<u32>,
     /// Rounds of timing at least
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub rounds: u16,
     /// Rounds of timing at most, while a ratio is not conclusive
-    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(long, default_value_t = 25, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub most_rounds: u16,
     /// What is measured; processor time on a device in software, else timestamps, else wall time
     #[arg(long, value_enum)]
@@ -90,23 +83,56 @@ pub struct BenchArgs {
 impl BenchArgs {
     /// The line that repeats this run, without paths.
     fn command(&self, subject: Subject) -> String {
-        let mut line = format!("veduta bench {}", format!("{subject:?}").to_lowercase());
-        if let Some(knob) = &self.knob {
-            line += &format!(
-                " --effect {} --knob {knob}",
-                format!("{:?}", self.effect).to_lowercase()
-            );
+        let lower = |text: String| text.to_lowercase();
+        let mut line = format!("veduta bench {}", lower(format!("{subject:?}")));
+        if let Some(effect) = self.effect {
+            line += &format!(" --effect {}", lower(format!("{effect:?}")));
         }
-        if self.preset != "thesis" {
-            line += &format!(" --preset {}", self.preset);
+        for (name, value) in [("--knob", &self.knob), ("--preset", &self.preset)] {
+            if let Some(value) = value {
+                line += &format!(" {name} {value}");
+            }
+        }
+        for (name, list) in [("--views", &self.views), ("--of", &self.presets)] {
+            if !list.is_empty() {
+                line += &format!(" {name} {}", list.join(","));
+            }
         }
         if let Some(size) = self.size {
             line += &format!(" --size {size}");
+        }
+        if let Some(seconds) = self.seconds {
+            line += &format!(" --seconds {seconds}");
+        }
+        for (name, value, usual) in [
+            ("--rounds", self.rounds, 9),
+            ("--most-rounds", self.most_rounds, 25),
+        ] {
+            if value != usual {
+                line += &format!(" {name} {value}");
+            }
+        }
+        if let Some(clock) = self.clock {
+            line += &format!(" --clock {}", lower(format!("{clock:?}")));
         }
         for set in &self.sets {
             line += &format!(" --set {set}");
         }
         line
+    }
+}
+
+/// A list as it was given; `None` when it was not.
+fn as_given(list: &[String]) -> Option<String> {
+    (!list.is_empty()).then(|| list.join(","))
+}
+
+/// A list as it was given, else the usual one.
+fn or_usual(list: &[String], usual: &[&str]) -> Vec<String> {
+    if list.is_empty() {
+        usual.iter().map(|&s| s.to_owned()).collect()
+    } else {
+        list.to_vec()
     }
 }
 
@@ -136,9 +162,48 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
         }
         (subject, _) => subject.unwrap_or(Subject::Presets),
     };
+    let others = |allowed: &[Subject]| !allowed.contains(&subject);
+    for (name, given, wrong, allowed) in [
+        (
+            "--views",
+            as_given(&args.views),
+            others(&[Subject::Presets, Subject::Knob])
+                || (subject == Subject::Knob && args.views.len() > 1),
+            "left out, or the subject `presets`, or one view of a knob",
+        ),
+        (
+            "--of",
+            as_given(&args.presets),
+            others(&[Subject::Presets]),
+            "left out, or the subject `presets`",
+        ),
+        (
+            "--seconds",
+            args.seconds.map(|s| s.to_string()),
+            others(&[Subject::Chapter6]),
+            "left out, or the subject `chapter6`",
+        ),
+        (
+            "--rounds",
+            (args.rounds > args.most_rounds).then(|| args.rounds.to_string()),
+            true,
+            "at most --most-rounds",
+        ),
+    ] {
+        if let (Some(given), true) = (given, wrong) {
+            return Err(CliError::argument(name, given, allowed));
+        }
+    }
+    if let Some(path) = &args.out {
+        if matches!(subject, Subject::Chapter6 | Subject::Knob) {
+            std::fs::create_dir_all(path).map_err(|e| CliError::write(path, e))?;
+        } else {
+            check_folder(path)?;
+        }
+    }
     let rounds = Rounds {
         least: usize::from(args.rounds),
-        most: usize::from(args.most_rounds.max(args.rounds)),
+        most: usize::from(args.most_rounds),
     };
     let gpu = veduta::device::shared()?;
     let natural = Clock::of(&gpu.adapter.get_info(), gpu.device.features());
@@ -187,8 +252,14 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
         Subject::Presets => {
             let plan = presets::Plan {
                 scene: "thesis".to_owned(),
-                presets: args.presets.clone(),
-                views: args.views.clone(),
+                presets: or_usual(&args.presets, &["thesis_low", "low", "medium", "high"]),
+                views: or_usual(
+                    &args.views,
+                    &[
+                        "V01", "V02", "V03", "V04", "V05", "V06", "V07", "V08", "V09", "V10",
+                        "V11", "V12",
+                    ],
+                ),
                 reference: "reference".to_owned(),
                 samples: 4,
                 rounds,
@@ -202,7 +273,10 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
             print!("{text}");
             if let Some(path) = &args.out {
                 write_text(path, &text)?;
-                write_json(&path.with_extension("json"), &presets::to_json(&entries))?;
+                write_json(
+                    &path.with_extension("json"),
+                    &presets::to_json(&bench, &entries, &command),
+                )?;
             }
         }
         Subject::Baseline => {
@@ -221,7 +295,10 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
             print!("{text}");
             if let Some(path) = &args.out {
                 write_text(path, &text)?;
-                write_json(&path.with_extension("json"), &noise::to_json(&rounds))?;
+                write_json(
+                    &path.with_extension("json"),
+                    &noise::to_json(&bench, &rounds, &command),
+                )?;
             }
         }
         Subject::Chapter6 => {
@@ -230,7 +307,7 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 .clone()
                 .unwrap_or_else(|| PathBuf::from("chapter6"));
             let plan = chapter6::Plan {
-                seconds: args.seconds,
+                seconds: args.seconds.unwrap_or(60),
                 rounds,
                 quick: false,
             };
@@ -245,9 +322,9 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
             let view = args.views.first().map_or("V01", String::as_str);
             let report = knob::run(
                 &bench,
-                args.effect,
+                args.effect.unwrap_or(Effect::All),
                 &knob,
-                &args.preset,
+                args.preset.as_deref().unwrap_or("thesis"),
                 view,
                 rounds,
                 &mut progress,

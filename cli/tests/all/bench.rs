@@ -1,7 +1,7 @@
 //! `veduta bench`, small.
 
 use veduta_cli::bench::knob::{self, Effect, Knob};
-use veduta_cli::bench::timing::{Clock, Rounds, in_turns};
+use veduta_cli::bench::timing::{Clock, Rounds, beside_bases};
 use veduta_cli::bench::{Bench, baseline, chapter6, presets};
 use veduta_cli::catalog::{Catalog, SourceArgs};
 use veduta_cli::commands::render::RenderArgs;
@@ -174,14 +174,15 @@ fn presets_are_compared_with_the_baseline_and_references_are_kept() {
     for part in ["llvm", "## `thesis_low`", "| V08 ", "time / thesis_skip"] {
         assert!(text.to_lowercase().contains(&part.to_lowercase()), "{part}");
     }
-    let mut earlier = presets::to_json(&entries);
-    assert_eq!(earlier.as_array().unwrap().len(), 3);
+    let mut earlier = presets::to_json(&bench, &entries, "test");
+    assert_eq!(earlier["command"], "test");
+    assert_eq!(earlier["entries"].as_array().unwrap().len(), 3);
     // Against itself nothing differs; a ratio that was another, and surely so, does.
     let same = presets::compare(&entries, &earlier);
     assert_eq!((same.apart, same.largest), (0, 0.0));
     let mut sure = entries.clone();
     sure[2].to_thesis.uncertainty = 0.0;
-    earlier[2]["to_thesis"] =
+    earlier["entries"][2]["to_thesis"] =
         serde_json::json!({ "median": 1.25 * sure[2].to_thesis.median, "conclusive": true });
     let other = presets::compare(&sure, &earlier);
     assert!(
@@ -270,9 +271,11 @@ fn a_subject_against_itself_has_the_ratio_1() {
         bench.subject(&job, 0.0).unwrap(),
     ];
     let rounds = Rounds { least: 9, most: 9 };
-    let times = in_turns(&mut subjects, &[0], Clock::Cpu, rounds, &mut || {}).unwrap();
-    assert!(times.iter().all(|t| t.len() == 9));
-    let ratio = veduta_cli::bench::timing::Ratio::of(&times[1], &times[0]);
+    let turns = beside_bases(&mut subjects, &[0], Clock::Cpu, rounds, &mut || {}).unwrap();
+    assert!(turns.times.iter().all(|t| t.len() == 9));
+    let ratio = turns.ratio(1, 0);
+    assert_eq!(turns.ratio(0, 0).median, 1.0);
+    assert!(turns.ratio(0, 1).median.is_nan(), "the second is no base");
     println!("against itself: {ratio} +- {:.3}", ratio.uncertainty);
     assert!((0.4..2.5).contains(&ratio.median), "{ratio:?}");
 }
@@ -309,7 +312,7 @@ fn the_baseline_is_measured_beside_the_machine() {
     )
     .good();
     let noises = json(&dir.join("noise.json"));
-    let noises = noises.as_array().unwrap();
+    let noises = noises["noises"].as_array().unwrap();
     assert!(noises.len() >= 8);
     assert!(
         noises
@@ -339,5 +342,34 @@ fn wrong_arguments_are_named() {
     veduta(&dir, &["bench", "--knob", "CLOUD_STEPS=8..9999999"]).bad(1, &["CLOUD_STEPS"]);
     veduta(&dir, &["bench", "presets", "--knob", "CLOUD_STEPS=8..16"]).bad(1, &["--knob"]);
     veduta(&dir, &["bench", "--rounds", "0"]).bad(2, &["--rounds"]);
+    // Told before the work.
+    veduta(&dir, &["bench", "--effect", "clouds"]).bad(2, &["--knob"]);
+    veduta(&dir, &["bench", "--rounds", "20", "--most-rounds", "3"]).bad(1, &["--rounds", "20"]);
+    veduta(&dir, &["bench", "chapter6", "--views", "V02"]).bad(1, &["--views", "V02"]);
+    veduta(&dir, &["bench", "presets", "--seconds", "3"]).bad(1, &["--seconds"]);
+    veduta(&dir, &["bench", "presets", "--of", "nope"]).bad(1, &["nope"]);
+    veduta(&dir, &["bench", "presets", "--out", "no/such/file.md"]).bad(1, &["no/such"]);
+    veduta(&dir, &["bench", "--knob", "CLOUD_STEPS=8,8"]).bad(1, &["8,8", "once"]);
+    veduta(&dir, &["bench", "--knob", "CLOUD_COVERAGE=0.1,0.3"])
+        .bad(1, &["CLOUD_COVERAGE", "quality"]);
+    veduta(&dir, &["bench", "--knob", "CLOUDS"]).bad(1, &["CLOUDS", "quality"]);
+    // A driver that ends loops in silence would cut this picture short.
+    let run = veduta(
+        &dir,
+        &[
+            "bench",
+            "--effect",
+            "clouds",
+            "--knob",
+            "CLOUD_STEPS=4096",
+            "--set",
+            "CLOUD_LIGHT_STEPS=64",
+            "--size",
+            "16x9",
+        ],
+    );
+    if run.code != 0 {
+        run.bad(1, &["CLOUD_STEPS=4096", "65535"]);
+    }
     veduta(&dir, &["bench", "--views", "V99", "--size", "8x8"]).bad(1, &["V99"]);
 }

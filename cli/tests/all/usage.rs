@@ -18,6 +18,11 @@ fn help_names_every_command() {
 }
 
 #[test]
+fn no_command_defines_an_argument_twice() {
+    <veduta_cli::args::Args as clap::CommandFactory>::command().debug_assert();
+}
+
+#[test]
 fn arguments_that_cannot_be_read_exit_with_2() {
     let dir = folder("usage");
     veduta(&dir, &[]).bad(2, &["Usage"]);
