@@ -189,6 +189,13 @@ fn wide(v: glam::Vec3) -> [f64; 3] {
 }
 
 /// Unit vectors through the middles of all pixels, row by row from the top.
+///
+/// # Errors
+/// As [`View::rays`].
+pub fn directions(view: &View, size: Size) -> Result<Vec<[f64; 3]>, CliError> {
+    Ok(rays(view, size)?.into_iter().map(|r| r.dir).collect())
+}
+
 fn rays(view: &View, size: Size) -> Result<Vec<PixelRay>, CliError> {
     let [middle, right, up] = view.rays()?.map(|r| r.as_dvec3());
     let mut list = Vec::new();
@@ -207,8 +214,8 @@ fn rays(view: &View, size: Size) -> Result<Vec<PixelRay>, CliError> {
     Ok(list)
 }
 
-/// About the angle that a pixel in the middle spans.
-fn pixel_angle(view: &View, size: Size) -> f64 {
+/// About the angle that a pixel in the middle spans, in radians.
+pub fn pixel_angle(view: &View, size: Size) -> f64 {
     view.rays().map_or(0.0, |[middle, right, _]| {
         f64::from(right.length() / middle.length()) * 2.0 / f64::from(size.width)
     })

@@ -6,6 +6,7 @@ use veduta::{Settings, Value, View};
 
 use super::check::{Check, Fault};
 use super::samples::Random;
+use crate::bench::truth::{directions, pixel_angle};
 use crate::camera::{Camera, EyeHeight};
 use crate::catalog::SourceArgs;
 use crate::commands::render::{Job, RenderArgs};
@@ -95,13 +96,13 @@ fn largest_henyey_greenstein(g: f64) -> f64 {
 /// once and without loss.
 ///
 /// - a surface: albedo over pi times the sum of the three lights;
-/// - the disc: 1 over its solid angle;
+/// - the disc, in pixels that may see it: 1 over its solid angle;
 /// - air, before everything and once more before the clouds: what is scattered out of the ray, at most all of it, times
 ///   the largest value of the phase function. Where the aerosol scatters more than it takes away, what it scatters is at
 ///   most the ratio of both, and at most the optical depth of scattering along the longest path;
 /// - clouds: the share that is scattered, at most all, times albedo and phase function. The march is of first order in a
 ///   step's optical depth x, so that 1 becomes at most 1 + x.
-pub fn radiance_bound(settings: &Settings, view: &View) -> f64 {
+pub fn radiance_bound(settings: &Settings, view: &View, disc: bool) -> f64 {
     let number = |name: &str| settings.number(name).unwrap_or(0.0);
     let most = |name: &str| match settings.get(name) {
         Some(Value::Vec3(v)) => v.iter().copied().fold(0.0, f64::max),
@@ -111,7 +112,11 @@ pub fn radiance_bound(settings: &Settings, view: &View) -> f64 {
     let lights = ["SUN_LIGHT", "SKY_LIGHT", "BOUNCE_LIGHT"].map(most);
     let surface = albedo.iter().copied().fold(0.0, f64::max) * lights.iter().sum::<f64>()
         / std::f64::consts::PI;
-    let disc = 1.0 / (std::f64::consts::PI * f64::from(view.sun.angular_radius).powi(2));
+    let disc = if disc {
+        1.0 / (std::f64::consts::PI * f64::from(view.sun.angular_radius).powi(2))
+    } else {
+        0.0
+    };
     let path = 2.0 * (number("PLANET_RADIUS") + number("ATMOSPHERE_HEIGHT"));
     let (scattering, extinction) = (number("MIE_SCATTERING"), number("MIE_EXTINCTION"));
     let excess = (scattering / extinction.max(1e-30))
@@ -123,7 +128,11 @@ pub fn radiance_bound(settings: &Settings, view: &View) -> f64 {
     let step = number("MAX_CLOUD_DISTANCE") / number("CLOUD_STEPS").max(1.0);
     let lobe = largest_henyey_greenstein(number("CLOUD_G_FORWARD"))
         .max(largest_henyey_greenstein(number("CLOUD_G_BACKWARD")));
-    let clouds = (1.0 + depth * step) * lobe;
+    let clouds = if settings.features().contains(&"CLOUDS") {
+        (1.0 + depth * step) * lobe
+    } else {
+        0.0
+    };
     f64::from(view.sun.irradiance.max_element()) * (surface + disc + 2.0 * air + clouds) * 1.001
 }
 
@@ -200,7 +209,18 @@ impl Stage {
             Err(error) => return Err(error),
         }
         let rgba = self.renderer.read_rgba32()?;
-        let bound = radiance_bound(&settings, &view);
+        // The disc itself and the pixels that it reaches into, as wide as the widest pixel may be seen.
+        let reach = f64::from(view.sun.angular_radius) + 4.0 * pixel_angle(&view, SIZE);
+        let to_sun = view.sun.to_light.as_dvec3().normalize().to_array();
+        let [plain, sunny] =
+            [false, true].map(|disc| radiance_bound(&settings, &view, disc).max(1.0));
+        let bounds: Vec<f64> = directions(&view, SIZE)?
+            .iter()
+            .map(|dir| {
+                let cosine = dir.iter().zip(to_sun).map(|(a, b)| a * b).sum::<f64>();
+                if cosine >= reach.cos() { sunny } else { plain }
+            })
+            .collect();
         self.found.drawn += 1;
         let case = |i: usize, value: f32| {
             let values: Vec<String> = values.iter().map(|(k, v)| format!("{k}={v}")).collect();
@@ -221,10 +241,12 @@ impl Stage {
         let negative = rgba.iter().position(|v| *v < 0.0);
         let bright = rgba
             .iter()
-            .position(|v| v.is_finite() && f64::from(*v) > bound.max(1.0));
-        for v in rgba.iter().filter(|v| v.is_finite()) {
-            if bound > 0.0 {
-                self.found.share = self.found.share.max((f64::from(*v) - 1.0) / bound);
+            .zip(0..)
+            .position(|(v, i): (&f32, usize)| v.is_finite() && f64::from(*v) > bounds[i / 4]);
+        for (v, i) in rgba.iter().zip(0..) {
+            // The alpha channel is 1.
+            if v.is_finite() && i % 4 < 3 {
+                self.found.share = self.found.share.max(f64::from(*v) / bounds[i / 4]);
             }
         }
         if let Some(i) = bad {
@@ -240,7 +262,7 @@ impl Stage {
         if let Some(i) = bright {
             self.fault(
                 Check::Energy,
-                format!("above {bound:e}: {}", case(i, rgba[i])),
+                format!("above {:e}: {}", bounds[i / 4], case(i, rgba[i])),
             );
         }
         self.reset(values)
@@ -299,16 +321,29 @@ pub fn check(
             .filter(|k| k.kind == KeyKind::Content)
             .filter_map(|k| Some((k.name.to_string(), k.ty.to_string(), k.domain?)))
             .collect();
-        let camera = |altitude: f64, pitch: f64, sun: f64, towards_sun: bool| Camera {
+        let at = |height: EyeHeight, pitch: f64, sun: f64, towards_sun: bool| Camera {
             x: 13_500.0,
             z: -14_700.0,
-            height: EyeHeight::Altitude(altitude),
+            height,
             yaw: 30.0,
             pitch,
             field_of_view: 60.0,
             sun_height: sun,
             sun_azimuth: if towards_sun { 0.0 } else { 120.0 },
         };
+        let camera = |altitude: f64, pitch: f64, sun: f64, towards_sun: bool| {
+            at(EyeHeight::Altitude(altitude), pitch, sun, towards_sun)
+        };
+        // On the ground, under it and a millimetre above.
+        for above in [0.0, -0.5, 1e-3] {
+            for (k, pitch) in [-90.0, -5.0, 0.0, 30.0].into_iter().enumerate() {
+                let sun = SUNS[(5 * k + variant) % SUNS.len()];
+                stage.picture(
+                    &at(EyeHeight::AboveGround(above), pitch, sun, k % 2 == 0),
+                    &[],
+                )?;
+            }
+        }
         // Views: all of them, or a part that changes from variant to variant.
         let mut index = variant;
         for altitude in ALTITUDES {

@@ -205,29 +205,37 @@ fn integrals_that_are_not_1_are_found() {
 
 #[test]
 fn pictures_that_are_negative_too_bright_or_not_finite_are_found() {
-    let dir = folder("stress_pictures");
-    for (path, text) in shipped::FILES {
-        let file = dir.join(path);
-        std::fs::create_dir_all(file.parent().unwrap()).unwrap();
-        let from = "return coverage / (PI * area);";
-        let to = "let factor = select(select(-1.0, 1e20, dir.y > 0.1), 1e38, dir.y > 0.4);\n    \
-                  return factor * coverage / (PI * area);";
-        std::fs::write(file, text.replace(from, to)).unwrap();
-    }
-    let sources = SourceArgs {
-        modules: vec![dir.join("wgsl")],
-        presets: vec![dir.join("presets")],
-        no_shipped: true,
+    let broken = |name: &str, from: &str, to: &str| {
+        let dir = folder(name);
+        for (path, text) in shipped::FILES {
+            let file = dir.join(path);
+            std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+            std::fs::write(file, text.replace(from, to)).unwrap();
+        }
+        let sources = SourceArgs {
+            modules: vec![dir.join("wgsl")],
+            presets: vec![dir.join("presets")],
+            no_shipped: true,
+        };
+        let gpu = veduta::device::shared().unwrap();
+        effects::check(gpu, &sources, true, &|_| {}).unwrap().faults
     };
-    let gpu = veduta::device::shared().unwrap();
-    let found = effects::check(gpu, &sources, true, &|_| {}).unwrap();
+    let sun = broken(
+        "stress_pictures",
+        "return coverage / (PI * area);",
+        "let factor = select(select(-1.0, 1e20, dir.y > 0.1), 1e38, dir.y > 0.4);\n    \
+         return factor * coverage / (PI * area);",
+    );
     for check in [Check::Range, Check::Energy, Check::Finite] {
-        assert!(
-            found.faults.iter().any(|f| f.check == check),
-            "{check:?}: {:?}",
-            found.faults
-        );
+        assert!(sun.iter().any(|f| f.check == check), "{check:?}: {sun:?}");
     }
+    // Rocks a thousand times too bright are far below the sun's disc.
+    let rocks = broken(
+        "stress_rocks",
+        "const INVERSE_PI: f32 = 0.31830989;",
+        "const INVERSE_PI: f32 = 318.30989;",
+    );
+    assert!(rocks.iter().any(|f| f.check == Check::Energy), "{rocks:?}");
 }
 
 #[test]
