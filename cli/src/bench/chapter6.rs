@@ -6,18 +6,20 @@ use std::path::Path;
 use serde_json::json;
 use veduta::Value;
 
-use super::plot::{Plot, Series};
-use super::timing::{Middle, Ratio, Rounds, in_turns};
+use super::plot::{Plot, Point, Series};
+use super::timing::{Middle, Ratio, Rounds, beside_bases};
 use super::{Bench, decibels, side_by_side, table, write_text};
 use crate::commands::render::write_json;
 use crate::error::CliError;
 use crate::image::write_png;
-use crate::metrics::{Difference, Picture, amplified};
+use crate::metrics::{Difference, amplified};
 
 /// Steps along the view ray.
 pub const PRIMARY: [i64; 5] = [16, 32, 64, 128, 512];
 /// Steps towards the sun.
 pub const SECONDARY: [i64; 4] = [6, 12, 24, 32];
+/// Steps towards the sun of the pictures side by side.
+const SHOWN: i64 = 12;
 
 /// One second of the flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,7 +56,7 @@ pub struct Jitter {
     pub off: Difference,
     /// With it.
     pub on: Difference,
-    /// How alike neighbouring pixels' errors are, without jitter: 1 stripes, 0 noise.
+    /// [`stripes`] without jitter.
     pub stripes_off: f64,
     /// With it.
     pub stripes_on: f64,
@@ -92,24 +94,45 @@ fn steps(primary: i64, secondary: i64) -> [(&'static str, Value); 2] {
 /// The view of the sweep and of the jitter: two thirds sky, as in the source.
 const VIEW: &str = "V01";
 
-/// The correlation of the errors of pixels that are neighbours in a row.
+/// How far a neighbourhood's mean reaches in [`stripes`].
+const REACH: usize = 3;
+
+/// The correlation of the errors of pixels that are neighbours in a row, after what is smooth has been taken away: 1 for
+/// stripes along the rows, about 0 for noise, -1 for stripes one pixel wide along the columns.
 ///
-/// Of luminance, where there is an error at all; 0 without any.
-pub fn stripes(picture: &Picture, reference: &Picture) -> f64 {
-    let error: Vec<f64> = picture
-        .rgb
+/// Of 8-bit RGB pictures as they are displayed, where stripes are seen; in radiance a few bright pixels would decide. From
+/// each pixel's error, the sum of the channels, goes the mean of the 7x7 pixels around it, so that neither a constant nor a
+/// linear bias counts; pixels nearer to the edge than that are left out. 0 where nothing to speak of is left.
+pub fn stripes(shown: &[u8], wanted: &[u8], width: usize) -> f64 {
+    let error: Vec<f64> = shown
         .chunks_exact(3)
-        .zip(reference.rgb.chunks_exact(3))
+        .zip(wanted.chunks_exact(3))
         .map(|(a, b)| (0..3).map(|c| f64::from(a[c]) - f64::from(b[c])).sum())
         .collect();
+    let height = error.len() / width.max(1);
+    let rest = |x: usize, y: usize| {
+        let around: f64 = (y - REACH..=y + REACH)
+            .flat_map(|y| &error[y * width + x - REACH..=y * width + x + REACH])
+            .sum();
+        error[y * width + x] - around / ((2 * REACH + 1) * (2 * REACH + 1)) as f64
+    };
     let (mut product, mut square) = (0.0, 0.0);
-    for row in error.chunks_exact(picture.width) {
+    for y in REACH..height.saturating_sub(REACH) {
+        let row: Vec<f64> = (REACH..width.saturating_sub(REACH))
+            .map(|x| rest(x, y))
+            .collect();
         for pair in row.windows(2) {
             product += pair[0] * pair[1];
             square += 0.5 * (pair[0] * pair[0] + pair[1] * pair[1]);
         }
     }
-    if square == 0.0 { 0.0 } else { product / square }
+    // Otherwise the rounding of a smooth error would be judged.
+    let whole: f64 = error.iter().map(|e| e * e).sum();
+    if square <= 1e-6 * whole {
+        0.0
+    } else {
+        product / square
+    }
 }
 
 /// Runs the evaluation and writes pictures into `folder` as it goes; `progress` hears what is next.
@@ -154,21 +177,26 @@ pub fn run(
         });
     }
     drop(subjects);
+    let save = |name: &str, pictures: &[Vec<u8>]| {
+        let (w, h, rgb) = side_by_side(pictures, width, height);
+        write_png(&folder.join(name), w, h, &rgb)
+    };
+    let mut shown = Vec::new();
+    for job in [&normal, &low] {
+        shown.push(bench.picture(job, 0.0, 1)?.display(bench.exposure(job)));
+    }
+    save("flight_quality.png", &shown)?;
 
     progress("cloud steps: reference");
     let (primary, secondary): (&[i64], &[i64]) = if plan.quick {
-        (&PRIMARY[..2], &SECONDARY[..2])
+        (&PRIMARY[..3], &SECONDARY[..2])
     } else {
         (&PRIMARY, &SECONDARY)
     };
-    let finest = if plan.quick {
-        steps(64, 12)
-    } else {
-        steps(512, 32)
-    };
-    let converged = bench.job("thesis", "thesis", VIEW, &finest)?;
+    let converged = bench.job("thesis", "thesis", VIEW, &steps(512, 32))?;
     let reference = bench.reference(&converged, 0.0, 1)?;
     let exposure = bench.exposure(&converged);
+    let wanted = reference.display(exposure);
     let pairs: Vec<(i64, i64)> = primary
         .iter()
         .flat_map(|p| secondary.iter().map(|s| (*p, *s)))
@@ -182,50 +210,58 @@ pub fn run(
         .map(|j| bench.subject(j, 0.0))
         .collect::<Result<Vec<_>, _>>()?;
     let mut draws = 0;
-    let times = in_turns(&mut subjects, &[0], bench.clock, plan.rounds, &mut || {
+    let turns = beside_bases(&mut subjects, &[0], bench.clock, plan.rounds, &mut || {
         draws += 1;
         progress(&format!("cloud steps: draw {draws}"));
     })?;
     drop(subjects);
     let mut sweep = Vec::new();
+    let (mut shown, mut errors) = (Vec::new(), Vec::new());
     for (k, (p, s)) in pairs.iter().enumerate() {
         progress(&format!("cloud steps: picture of {p} x {s}"));
         let picture = bench.picture(&jobs[k + 1], 0.0, 1)?;
+        if *s == SHOWN {
+            let display = picture.display(exposure);
+            errors.push(amplified(&display, &wanted));
+            shown.push(display);
+        }
         sweep.push(Steps {
             primary: *p,
             secondary: *s,
-            time: Middle::of(&times[k + 1]),
-            ratio: Ratio::of(&times[k + 1], &times[0]),
+            time: Middle::of(&turns.times[k + 1]),
+            // The base's own cell is the base.
+            ratio: turns.ratio(if (*p, *s) == (64, 12) { 0 } else { k + 1 }, 0),
             difference: picture.difference(&reference, exposure)?,
         });
     }
+
+    shown.push(wanted.clone());
+    save("cloud_steps.png", &shown)?;
+    save("cloud_steps_error_x8.png", &errors)?;
 
     let mut jitter = Vec::new();
     let mut shown = Vec::new();
     for p in if plan.quick { &[16][..] } else { &[16, 64][..] } {
         progress(&format!("jitter with {p} steps"));
         let [off, on] = [false, true].map(|on| {
-            let values = [&steps(*p, 12)[..], &[("CLOUD_JITTER", Value::Flag(on))]].concat();
+            let values = [&steps(*p, SHOWN)[..], &[("CLOUD_JITTER", Value::Flag(on))]].concat();
             bench.picture(&bench.job("thesis", "thesis", VIEW, &values)?, 0.0, 1)
         });
         let (off, on) = (off?, on?);
+        let displays = [off.display(exposure), on.display(exposure)];
         jitter.push(Jitter {
             primary: *p,
             off: off.difference(&reference, exposure)?,
             on: on.difference(&reference, exposure)?,
-            stripes_off: stripes(&off, &reference),
-            stripes_on: stripes(&on, &reference),
+            stripes_off: stripes(&displays[0], &wanted, width),
+            stripes_on: stripes(&displays[1], &wanted, width),
         });
-        shown.extend([off.display(exposure), on.display(exposure)]);
-        let magnified: Vec<Vec<u8>> = [&off, &on]
-            .map(|p| amplified(&p.display(exposure), &reference.display(exposure)))
-            .into();
-        let (w, h, rgb) = side_by_side(&magnified, width, height);
-        write_png(&folder.join(format!("jitter_{p}_error_x8.png")), w, h, &rgb)?;
+        let magnified = displays.each_ref().map(|d| amplified(d, &wanted));
+        save(&format!("jitter_{p}_error_x8.png"), &magnified)?;
+        shown.extend(displays);
     }
-    shown.push(reference.display(exposure));
-    let (w, h, rgb) = side_by_side(&shown, width, height);
-    write_png(&folder.join("jitter.png"), w, h, &rgb)?;
+    shown.push(wanted);
+    save("jitter.png", &shown)?;
     Ok(Report {
         flight,
         sweep,
@@ -233,10 +269,13 @@ pub fn run(
     })
 }
 
-/// The tables of a report.
+/// What the error pictures have in common.
+const MAGNIFIED: &str = "Grey is no difference; errors are magnified\neight times and clipped";
+
+/// The tables of a report, with the pictures and plots that [`run`] and [`write`] leave beside it.
 pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
     let mut text = format!(
-        "# Chapter 6 of Leitner 2022, repeated\n\nWritten by `{command}`.\n\n{}\n",
+        "# Chapter 6 of Leitner 2022, repeated\n\nWritten by `{command}`. What it says against the source: [`reading.md`](reading.md).\n\n{}\n",
         bench.machine()
     );
     let column =
@@ -277,7 +316,9 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
     }
     text += &table(&rows);
     text += &format!(
-        "\nNormal quality takes {ratio} times as long as LOW_QUALITY (median of the frames' ratios). ![flight](flight.svg)\n\n"
+        "\nNormal quality takes {ratio} times as long as LOW_QUALITY (median of the frames' ratios).\n\n![time of a frame over the flight](flight.svg)\n\n\
+         ![normal and LOW_QUALITY](flight_quality.png)\n\n\
+         From the left: normal quality, LOW_QUALITY, both at second 0, as displayed.\n\n"
     );
     text += "## Cloud steps\n\nTime over that of 64 x 12 steps, and PSNR in dB against 512 x 32 steps, view V01. A ratio in parentheses scattered too\nmuch to conclude from.\n\n";
     let mut secondary: Vec<i64> = report.sweep.iter().map(|s| s.secondary).collect();
@@ -288,6 +329,8 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
     let (mut times, mut errors) = (vec![head.clone()], vec![head]);
     let mut primary: Vec<i64> = report.sweep.iter().map(|s| s.primary).collect();
     primary.dedup();
+    let listed: Vec<String> = primary.iter().map(i64::to_string).collect();
+    let listed = listed.join(", ");
     for p in primary {
         let row = |cell: &dyn Fn(&Steps) -> String| {
             let mut row = vec![p.to_string()];
@@ -300,7 +343,15 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
     text += &table(&times);
     text += "\n";
     text += &table(&errors);
-    text += "\n![cloud steps](cloud_steps.svg)\n\n## Jitter\n\nThe stripes' measure is the correlation of the errors of neighbouring pixels: 1 for stripes, 0 for noise. Pictures, from\nthe left: 16 steps without and with jitter, 64 steps without and with, reference. ![jitter](jitter.png) Errors, eight times:\n![16 steps](jitter_16_error_x8.png)\n\n";
+    text += &format!(
+        "\n![PSNR over time of the cloud steps](cloud_steps.svg)\n\n![cloud steps](cloud_steps.png)\n\n\
+         From the left: {listed} primary steps with {SHOWN} secondary ones, then the reference, 512 x 32.\n\n\
+         ![errors of the cloud steps](cloud_steps_error_x8.png)\n\n\
+         The same pictures' errors, without the reference. {MAGNIFIED}.\n\n## Jitter\n\n"
+    );
+    text += "The stripes' measure is the correlation of the errors of neighbouring pixels in a row, of the displayed pictures, after\n\
+             the mean of the 7x7 pixels around has been subtracted from each, so that neither a constant nor a linear bias counts: 1\n\
+             for stripes along the rows, about 0 for noise.\n\n";
     let mut rows = vec![
         [
             "primary steps",
@@ -321,7 +372,24 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
             format!("{:.3}", j.stripes_on),
         ]);
     }
-    text + &table(&rows)
+    text += &table(&rows);
+    let shown: Vec<String> = report
+        .jitter
+        .iter()
+        .map(|j| format!("{} primary steps without and with jitter", j.primary))
+        .collect();
+    text += &format!(
+        "\n![jitter](jitter.png)\n\nFrom the left: {}, then the reference,\n512 x 32; all others with {SHOWN} secondary steps.\n",
+        shown.join(",\n")
+    );
+    for j in &report.jitter {
+        text += &format!(
+            "\n![errors with {0} primary steps](jitter_{0}_error_x8.png)\n\n\
+             From the left: errors of {0} primary steps without and with jitter. {MAGNIFIED}.\n",
+            j.primary
+        );
+    }
+    text
 }
 
 /// Writes tables, JSON and plots beside the pictures.
@@ -333,7 +401,8 @@ pub fn write(bench: &Bench, report: &Report, command: &str, folder: &Path) -> Re
         &folder.join("chapter6.md"),
         &markdown(bench, report, command),
     )?;
-    let document = json!({
+    let mut document = bench.head(command);
+    let results = json!({
         "flight": report.flight.iter().map(|s| json!([s.time, s.normal, s.low])).collect::<Vec<_>>(),
         "cloud_steps": report.sweep.iter().map(|s| json!({
             "primary": s.primary, "secondary": s.secondary, "time_ms": s.time.median, "ratio": s.ratio.median,
@@ -345,13 +414,21 @@ pub fn write(bench: &Bench, report: &Report, command: &str, folder: &Path) -> Re
             "stripes_off": j.stripes_off, "stripes_on": j.stripes_on,
         })).collect::<Vec<_>>(),
     });
+    if let (Some(head), Some(results)) = (document.as_object_mut(), results.as_object()) {
+        head.extend(results.clone());
+    }
     write_json(&folder.join("chapter6.json"), &document)?;
     let line = |name: &str, f: fn(&Second) -> f64| Series {
         name: name.to_owned(),
         points: report
             .flight
             .iter()
-            .map(|s| (s.time, f(s), String::new()))
+            .map(|s| Point {
+                x: s.time,
+                y: f(s),
+                label: String::new(),
+                conclusive: true,
+            })
             .collect(),
         joined: true,
     };
@@ -360,32 +437,44 @@ pub fn write(bench: &Bench, report: &Report, command: &str, folder: &Path) -> Re
         x: "simulated time [s]",
         y: &format!("{} of a frame [ms]", bench.clock.describe()),
         log_x: false,
+        y_from_zero: true,
         series: &[
             line("normal (thesis)", |s| s.normal),
             line("LOW_QUALITY (thesis_low)", |s| s.low),
         ],
+        notes: &[],
     }
     .write(&folder.join("flight.svg"))?;
     let series: Vec<Series> = SECONDARY
         .iter()
         .map(|secondary| Series {
-            name: format!("{secondary} steps to the sun"),
+            name: format!("{secondary} secondary steps (towards the sun)"),
             points: report
                 .sweep
                 .iter()
                 .filter(|s| s.secondary == *secondary)
-                .map(|s| (s.ratio.median, s.difference.psnr, s.primary.to_string()))
+                .map(|s| Point {
+                    x: s.ratio.median,
+                    y: s.difference.psnr,
+                    label: s.primary.to_string(),
+                    conclusive: s.ratio.conclusive(),
+                })
                 .collect(),
             joined: true,
         })
         .filter(|s| !s.points.is_empty())
         .collect();
     Plot {
-        title: "Cloud steps: PSNR against 512 x 32 steps over time",
-        x: "time over that of 64 x 12 steps (logarithmic)",
-        y: "PSNR [dB]",
+        title: "Cloud steps: error over time; labels are primary steps, lines secondary steps",
+        x: "time over that of 64 x 12 steps",
+        y: "PSNR against 512 x 32 steps [dB]",
         log_x: true,
+        y_from_zero: false,
         series: &series,
+        notes: &[
+            "labels: primary steps (along the view ray)",
+            "512 x 32 is the reference and has no finite PSNR: it is left out",
+        ],
     }
     .write(&folder.join("cloud_steps.svg"))
 }
@@ -396,23 +485,27 @@ mod tests {
 
     #[test]
     fn stripes_and_noise_are_told_apart() {
-        let flat = Picture::new(64, 8, vec![1.0; 3 * 64 * 8]).unwrap();
-        let with = |f: &dyn Fn(usize, usize) -> f32| {
-            let rgb = (0..64 * 8)
-                .flat_map(|i| [1.0 + f(i % 64, i / 64); 3])
-                .collect();
-            Picture::new(64, 8, rgb).unwrap()
+        let flat = vec![100; 3 * 64 * 32];
+        let bands = |_, y: usize| if y % 2 == 0 { 10 } else { -10 };
+        let noise = |x: usize, y: usize| {
+            let mixed = (x as u32 + 64 * y as u32 + 1).wrapping_mul(0x9e37_79b9);
+            let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca6b);
+            ((mixed ^ (mixed >> 13)) >> 8) as i32 % 21 - 10
         };
-        let bands = with(&|_, y| if y % 2 == 0 { 0.1 } else { -0.1 });
-        let noise = with(&|x, y| {
-            if (x * 7919 + y * 104_729) / 3 % 2 == 0 {
-                0.1
-            } else {
-                -0.1
-            }
-        });
-        assert!((stripes(&bands, &flat) - 1.0).abs() < 1e-6);
-        assert!(stripes(&noise, &flat).abs() < 0.5);
-        assert_eq!(stripes(&flat, &flat), 0.0);
+        let ramp = |x: usize, y: usize| 20 + x as i32 - y as i32;
+        let of = |f: &dyn Fn(usize, usize) -> i32| {
+            let shown: Vec<u8> = (0..64 * 32)
+                .flat_map(|i| [(100 + f(i % 64, i / 64)) as u8; 3])
+                .collect();
+            stripes(&shown, &flat, 64)
+        };
+        assert!((of(&bands) - 1.0).abs() < 1e-5);
+        assert!((of(&|x, y| bands(x, y) + ramp(x, y)) - 1.0).abs() < 1e-5);
+        assert!(of(&noise).abs() < 0.1, "{}", of(&noise));
+        assert!(of(&|x, y| noise(x, y) + ramp(x, y)).abs() < 0.1);
+        assert!(of(&|_, _| 30).abs() < 1e-6);
+        assert!(of(&ramp).abs() < 1e-6);
+        assert!(of(&|x, y| bands(y, x)) < -0.8);
+        assert_eq!(stripes(&flat, &flat, 64), 0.0);
     }
 }

@@ -6,7 +6,7 @@ use serde_json::json;
 use veduta::program::{KeyKind, SceneTable};
 use veduta::{ProgramSet, Value};
 
-use super::plot::{Plot, Series};
+use super::plot::{Plot, Point, Series};
 use super::timing::{Middle, Ratio, Rounds, beside_bases};
 use super::truth::Truth;
 use super::{Bench, JUDGED, judged_cells, judged_json, pareto, side_by_side, table, write_text};
@@ -350,10 +350,14 @@ pub fn write(
 ) -> Result<(), CliError> {
     std::fs::create_dir_all(folder).map_err(|e| CliError::write(folder, e))?;
     let name = knob.key.to_ascii_lowercase();
-    write_text(
-        &folder.join(format!("{name}.md")),
-        &markdown(bench, knob, report, command),
-    )?;
+    let values: Vec<String> = report.entries.iter().map(|e| e.value.to_string()).collect();
+    let text = format!(
+        "{}\n![error against time]({name}.svg)\n\n![pictures]({name}.png)\n\nFrom the left: {} = {}, then the reference.\n",
+        markdown(bench, knob, report, command),
+        knob.key,
+        values.join(", "),
+    );
+    write_text(&folder.join(format!("{name}.md")), &text)?;
     let entries: Vec<serde_json::Value> = report
         .entries
         .iter()
@@ -381,41 +385,47 @@ pub fn write(
     document["reference"] = report.reference.as_str().into();
     document["entries"] = entries.into();
     write_json(&folder.join(format!("{name}.json")), &document)?;
-    let points = |front: bool| -> Vec<(f64, f64, String)> {
-        let mut list: Vec<&Entry> = report
-            .entries
-            .iter()
-            .filter(|e| !front || e.on_front)
-            .collect();
-        list.sort_by(|a, b| a.ratio.median.total_cmp(&b.ratio.median));
-        list.iter()
-            .map(|e| {
-                let label = if front {
-                    String::new()
-                } else {
-                    e.value.to_string()
-                };
-                (e.ratio.median, e.difference.psnr, label)
-            })
-            .collect()
-    };
+    // Each setting is in one of the two, so that no mark hides another.
+    let series: Vec<Series> = [("Pareto front", true), ("beaten by another setting", false)]
+        .into_iter()
+        .map(|(name, front)| {
+            let mut list: Vec<&Entry> = report
+                .entries
+                .iter()
+                .filter(|e| e.on_front == front)
+                .collect();
+            list.sort_by(|a, b| a.ratio.median.total_cmp(&b.ratio.median));
+            let point = |e: &&Entry| Point {
+                x: e.ratio.median,
+                y: e.difference.psnr,
+                label: e.value.to_string(),
+                conclusive: e.ratio.conclusive(),
+            };
+            Series {
+                name: name.to_owned(),
+                points: list.iter().map(point).collect(),
+                joined: front,
+            }
+        })
+        .filter(|s| !s.points.is_empty())
+        .collect();
+    let labels = format!("labels: {}", knob.key);
+    let mut notes = vec![labels.as_str()];
+    if report
+        .entries
+        .iter()
+        .any(|e| !e.difference.psnr.is_finite())
+    {
+        notes.push("settings equal to the reference have no finite PSNR and are left out");
+    }
     Plot {
         title: &format!("{}: error against time", knob.key),
-        x: "time over that of the preset as it is (logarithmic)",
+        x: "time over that of the preset as it is",
         y: "PSNR against the converged picture [dB]",
         log_x: true,
-        series: &[
-            Series {
-                name: "Pareto front".to_owned(),
-                points: points(true),
-                joined: true,
-            },
-            Series {
-                name: "measured".to_owned(),
-                points: points(false),
-                joined: false,
-            },
-        ],
+        y_from_zero: false,
+        series: &series,
+        notes: &notes,
     }
     .write(&folder.join(format!("{name}.svg")))?;
     let (width, height) = (bench.size.width as usize, bench.size.height as usize);

@@ -217,20 +217,43 @@ fn row_l41_l42_l43_chapter_6_is_repeated() {
             .find(|e| e.primary == p && e.secondary == s)
             .unwrap()
     };
-    assert_eq!(report.sweep.len(), 4);
-    assert!(at(32, 12).difference.psnr > at(16, 12).difference.psnr + 2.0);
-    assert!(at(32, 12).time.median > at(16, 6).time.median);
+    assert_eq!(report.sweep.len(), 6);
+    let psnr = |p, s| at(p, s).difference.psnr;
+    for primary in [16, 32, 64] {
+        let (twelve, six) = (psnr(primary, 12), psnr(primary, 6));
+        assert!(twelve > six + 0.3, "{primary}: {twelve} against {six}");
+    }
+    for secondary in [6, 12] {
+        for primary in [32, 64] {
+            let (more, least) = (psnr(primary, secondary), psnr(16, secondary));
+            assert!(more > least + 2.0, "{primary}: {more} against {least}");
+        }
+    }
+    // Eight times the samples of the clouds, and more than twice the time of the whole picture.
+    assert!(at(64, 12).time.median > at(16, 6).time.median);
     // L43: jitter turns stripes into noise.
     let jitter = report.jitter[0];
     assert!(jitter.stripes_on < 0.6 * jitter.stripes_off, "{jitter:?}");
+    assert!(dir.join("chapter6.json").is_file());
+    let text = std::fs::read_to_string(dir.join("chapter6.md")).unwrap();
+    let embedded: Vec<&str> = text
+        .split("](")
+        .skip(1)
+        .filter_map(|t| Some(t.split_once(')')?.0))
+        .filter(|t| !t.ends_with(".md"))
+        .collect();
     for file in [
-        "chapter6.md",
-        "chapter6.json",
         "flight.svg",
+        "flight_quality.png",
         "cloud_steps.svg",
+        "cloud_steps.png",
+        "cloud_steps_error_x8.png",
         "jitter.png",
         "jitter_16_error_x8.png",
     ] {
+        assert!(embedded.contains(&file), "{file}: {embedded:?}");
+    }
+    for file in embedded {
         assert!(dir.join(file).is_file(), "{file}");
     }
 }
