@@ -106,7 +106,7 @@ fn ticks(range: &Range<f64>) -> Vec<f64> {
     (first..=last).map(|k| k as f64 * step).collect()
 }
 
-/// The logarithms of round numbers within a range of logarithms: 1, 2, 5 times powers of ten, evenly spaced numbers where
+/// The logarithms of round numbers within a range of logarithms: some to a power of ten, evenly spaced numbers where
 /// these are too few, powers of ten where they are too many.
 fn log_ticks(range: &Range<f64>) -> Vec<f64> {
     let decades = (range.start.floor() as i32)..=(range.end.ceil() as i32);
@@ -116,12 +116,20 @@ fn log_ticks(range: &Range<f64>) -> Vec<f64> {
             .filter(|t| range.contains(t))
             .collect()
     };
-    let list = within(
-        decades
-            .clone()
-            .flat_map(|d| [1.0, 2.0, 5.0].map(|m| m * 10.0_f64.powi(d)))
-            .collect(),
-    );
+    let of = |mantissas: &[f64]| {
+        let powers = decades.clone().map(|d| 10.0_f64.powi(d));
+        within(
+            powers
+                .flat_map(|p| mantissas.iter().map(move |m| m * p))
+                .collect(),
+        )
+    };
+    let dense = of(&[1.0, 1.5, 2.0, 3.0, 5.0, 7.0]);
+    let list = if dense.len() > 12 {
+        of(&[1.0, 2.0, 5.0])
+    } else {
+        dense
+    };
     match list.len() {
         0..4 => within(
             ticks(&(10.0_f64.powf(range.start)..10.0_f64.powf(range.end)))
