@@ -486,7 +486,7 @@ mod tests {
     #[test]
     fn stripes_and_noise_are_told_apart() {
         let flat = vec![100; 3 * 64 * 32];
-        let bands = |_, y: usize| if y % 2 == 0 { 10 } else { -10 };
+        let bands = |_, y: usize| if y.is_multiple_of(2) { 10 } else { -10 };
         let noise = |x: usize, y: usize| {
             let mixed = (x as u32 + 64 * y as u32 + 1).wrapping_mul(0x9e37_79b9);
             let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca6b);
