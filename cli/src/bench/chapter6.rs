@@ -272,7 +272,7 @@ pub fn run(
 /// What the error pictures have in common.
 const MAGNIFIED: &str = "Grey is no difference; errors are magnified\neight times and clipped";
 
-/// The tables of a report, with the pictures and plots that [`run`] and [`write`] leave beside it.
+/// The tables of a report, with the pictures and plots that [`run`] and [`write()`] leave beside it.
 pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
     let mut text = format!(
         "# Chapter 6 of Leitner 2022, repeated\n\nWritten by `{command}`. What it says against the source: [`reading.md`](reading.md).\n\n{}\n",
