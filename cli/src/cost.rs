@@ -15,7 +15,7 @@ use veduta::{Landscape, ProgramSet, Settings, Value, View, Work, wgpu};
 use veduta_compose::gate::{Target, Written, write_target};
 use veduta_compose::link::Linker;
 
-use crate::bench::timing::{Clock, Middle, Ratio, Rounds, Subject, in_turns};
+use crate::bench::timing::{Clock, Middle, Ratio, Rounds, Subject, beside_bases};
 use crate::bench::{Bench, table};
 use crate::commands::compose::with_values;
 use crate::commands::render::{Job, RenderArgs};
@@ -402,6 +402,8 @@ pub struct Times {
     pub first_draw: Vec<f64>,
     /// A frame.
     pub frame: Vec<f64>,
+    /// Frames over those of the whole scene drawn beside them.
+    pub to_scene: Option<Ratio>,
 }
 
 /// One variant of a scene and what it costs.
@@ -535,8 +537,11 @@ fn times(
             })
         })
         .collect::<Result<Vec<_>, CliError>>()?;
-    let frames = in_turns(&mut subjects, &[0], bench.clock, timing.rounds, &mut || {})?;
-    for (times, frames) in times.iter_mut().zip(frames) {
+    let turns = beside_bases(&mut subjects, &[0], bench.clock, timing.rounds, &mut || {})?;
+    for (k, times) in times.iter_mut().enumerate() {
+        times.to_scene = Some(turns.ratio(k, 0));
+    }
+    for (times, frames) in times.iter_mut().zip(turns.times) {
         times.frame = frames;
     }
     Ok(times)
@@ -654,8 +659,6 @@ impl Report {
         );
         if self.entries.iter().all(|e| e.times.is_some()) {
             text += "\nMilliseconds:\n\n";
-            let whole = self.entries.first().and_then(|e| e.times.clone());
-            let whole = whole.unwrap_or_default();
             text += &self.rows(
                 ["pipeline", "first draw", "frame", "frame / the scene's"]
                     .map(str::to_owned)
@@ -666,7 +669,7 @@ impl Report {
                         .iter()
                         .map(|(_, of)| format!("{:.1}", Middle::of(of(&times)).median))
                         .collect();
-                    row.push(Ratio::of(&times.frame, &whole.frame).to_string());
+                    row.push(times.to_scene.map_or_else(String::new, |r| r.to_string()));
                     row
                 },
                 &|more, less| {

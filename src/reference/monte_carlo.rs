@@ -3,6 +3,22 @@
 use super::math::{add, dot, normalize, scale};
 use std::f64::consts::{PI, TAU};
 
+/// 2^64 over the golden ratio, odd.
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+fn mix(mut z: u64) -> u64 {
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// The next 64 bits of the generator splitmix64 (Steele, Lea and Flood 2014) and its next state: enough to choose samples
+/// with, and to start a better generator.
+pub fn splitmix64(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(GOLDEN);
+    mix(*state)
+}
+
 /// A stream of random numbers: xoshiro256++ (Blackman and Vigna 2021) behind a seed and a stream number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Random {
@@ -12,17 +28,9 @@ pub struct Random {
 impl Random {
     /// The stream `stream` of the seed `seed`; equal arguments give equal numbers, others unrelated ones.
     pub fn new(seed: u64, stream: u64) -> Self {
-        // Splitmix64 over a start that depends on both words.
-        let mix = |mut z: u64| {
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            z ^ (z >> 31)
-        };
-        let mut word = mix(seed ^ 0x9e37_79b9_7f4a_7c15).wrapping_add(mix(!stream));
-        let state = std::array::from_fn(|_| {
-            word = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            mix(word)
-        });
+        // A start that depends on both words.
+        let mut word = mix(seed ^ GOLDEN).wrapping_add(mix(!stream));
+        let state = std::array::from_fn(|_| splitmix64(&mut word));
         Self { state }
     }
 

@@ -2,6 +2,7 @@
 
 use veduta::device::{Gpu, shared};
 use veduta::eval::{Evaluator, Spec};
+use veduta::reference::monte_carlo::splitmix64;
 use veduta_compose::library::Library;
 
 /// The shared device; its absence fails the test with the line that installs a driver.
@@ -42,11 +43,7 @@ pub struct Random(pub u64);
 impl Random {
     /// The next 64 bits.
     pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        splitmix64(&mut self.0)
     }
 
     /// The next number in [0, 1), a multiple of 2^-24 and so exact in `f32`.

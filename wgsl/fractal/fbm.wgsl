@@ -8,7 +8,7 @@
 //! symbols  octaves number of octaves [1] · hurst Hurst exponent H, 1 smooth, 0 rough [1]
 #define_import_path veduta::fractal::fbm
 
-#import veduta::noise::lattice::{Lattice3d, split_2d, split_3d, wrap_3d, finer_2d, finer_3d, shifted_2d, shifted_3d, octave_seed, octave_frequency, octave_fall, fade_fraction_3d}
+#import veduta::noise::lattice::{Lattice3d, split_2d, split_3d, wrap_3d, next_cell_3d, finer_2d, finer_3d, shifted_2d, shifted_3d, octave_seed, octave_frequency, octave_fall, fade_fraction_3d}
 #import veduta::noise::gradient::{gradient_at_2d, gradient_at_3d, gradient_at_2d_slope, gradient_at_3d_slope}
 #import veduta::hash::lattice::{SPREAD_3D, spread_zero_3d, lattice_keys_3d}
 #import veduta::noise::value::{value_between_3d, value_plus_one_3d}
@@ -154,8 +154,7 @@ fn periodic_octave_3d(p: Lattice3d, size: vec3<i32>, i: i32, seed: u32) -> f32 {
     // The cell is below the size, the shift carries at most one.
     let q = shifted_3d(p, i);
     let low = select(q.cell, vec3<i32>(0), q.cell >= size);
-    let next = low + 1;
-    return value_between_3d(low, select(next, vec3<i32>(0), next >= size), q.frac, octave_seed(seed, i));
+    return value_between_3d(low, next_cell_3d(low, size), q.frac, octave_seed(seed, i));
 }
 
 /// fBm of value noise in 3D on a lattice that repeats after `period` cells of octave 0 on each axis, divided by the sum

@@ -95,8 +95,7 @@ fn value_noise_3d(cell: vec3<i32>, frac: vec3<f32>, seed: u32) -> f32 {
 fn value_noise_3d_periodic(cell: vec3<i32>, frac: vec3<f32>, period: vec3<i32>, seed: u32) -> f32 {
     let p = split_3d(cell, frac);
     let low = wrap_3d(p.cell, period);
-    let next = low + 1;
-    return value_between_3d(low, select(next, vec3<i32>(0), next >= period), p.frac, seed);
+    return value_between_3d(low, next_cell_3d(low, period), p.frac, seed);
 }
 
 /// Value noise and its gradient between two opposite corners of a 2D cell, which need not be neighbours.

@@ -10,7 +10,7 @@ use veduta::device::Gpu;
 use veduta::eval::{Evaluator, Spec};
 use veduta_compose::Library;
 
-use super::timing::{Middle, Ratio, Rounds, Subject, in_turns};
+use super::timing::{Middle, Ratio, Subject};
 use super::{Bench, table};
 use crate::cpu::CpuTime;
 use crate::error::CliError;
@@ -172,22 +172,24 @@ pub fn run(
 ) -> Result<Vec<Round>, CliError> {
     let thesis = bench.job("thesis", "thesis", "V01", &[])?;
     let gauge = Gauge::new(&bench.gpu, &thesis.catalog.library()?)?;
-    let mut subjects: Vec<Subject> = vec![
+    let mut subjects: [Subject; 3] = [
         bench.subject(&thesis, 0.0)?,
         bench.subject(&bench.job("thesis", "thesis_skip", "V01", &[])?, 0.0)?,
         bench.subject(&bench.job("clear", "thesis", "V01", &[])?, 0.0)?,
     ];
+    for subject in &mut subjects {
+        subject.renderer.warm_up(&subject.view)?;
+    }
     let mut done = Vec::new();
     for k in 0..rounds.max(1) {
         progress(&format!("round {} of {}", k + 1, rounds.max(1)));
         let speed = gauge.speed()?;
-        let once = Rounds { least: 1, most: 1 };
-        let times = in_turns(&mut subjects, &[], bench.clock, once, &mut || {})?;
+        let [thesis, skip, clear] = &mut subjects;
         done.push(Round {
             speed,
-            thesis: times[0][0],
-            skip: times[1][0],
-            clear: times[2][0],
+            thesis: thesis.draw(bench.clock)?,
+            skip: skip.draw(bench.clock)?,
+            clear: clear.draw(bench.clock)?,
         });
     }
     Ok(done)

@@ -237,6 +237,8 @@ pub fn run(
         let job = &jobs[k + 1];
         let picture = bench.picture(job, 0.0, 1)?;
         let to_truth = match (&truth, alone(Some(value))?) {
+            // Alone is as it is drawn anyway, where nothing is to be left out.
+            (Some(truth), _) if effect.alone() == Some(&[]) => Some(truth.relative_rmse(&picture)),
             (Some(truth), Some(job)) => Some(truth.relative_rmse(&bench.picture(&job, 0.0, 1)?)),
             _ => None,
         };

@@ -85,43 +85,6 @@ pub struct Rounds {
     pub most: usize,
 }
 
-/// Draws all subjects once a round after one warm-up draw each, in the order A B C, then C B A, and so on, so that a drift
-/// cancels; `[subject][round]` milliseconds. Ratios to the subjects `bases` decide whether more rounds follow.
-///
-/// # Errors
-/// Faults of the device.
-pub fn in_turns(
-    subjects: &mut [Subject],
-    bases: &[usize],
-    clock: Clock,
-    rounds: Rounds,
-    progress: &mut dyn FnMut(),
-) -> Result<Vec<Vec<f64>>, CliError> {
-    let mut times = vec![Vec::new(); subjects.len()];
-    for subject in subjects.iter_mut() {
-        subject.renderer.warm_up(&subject.view)?;
-    }
-    for round in 0..rounds.most.max(rounds.least).max(1) {
-        for turn in 0..subjects.len() {
-            let k = if round % 2 == 0 {
-                turn
-            } else {
-                subjects.len() - 1 - turn
-            };
-            let time = subjects[k].draw(clock)?;
-            times[k].push(time);
-            progress();
-        }
-        let settled = bases
-            .iter()
-            .all(|base| (0..times.len()).all(|k| Ratio::of(&times[k], &times[*base]).conclusive()));
-        if round + 1 >= rounds.least.max(1) && settled {
-            break;
-        }
-    }
-    Ok(times)
-}
-
 /// Times of subjects, each with its bases drawn right beside it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Turns {
@@ -156,7 +119,7 @@ impl Turns {
     }
 }
 
-/// Draws every subject with each of the subjects `bases` right beside it: in the rounds in turns before and after it, so that
+/// Draws every subject, after one warm-up draw each, with each of the subjects `bases` right beside it: in the rounds in turns before and after it, so that
 /// a drift cancels, and what slows the machine for seconds slows both. Rounds follow until all ratios were conclusive after
 /// two rounds in succession, or there are as many as `rounds` allows.
 ///
@@ -299,6 +262,34 @@ mod tests {
         let ratio = Ratio::of(&half, &base);
         assert!((ratio.median - 0.5).abs() < 1e-12 && ratio.conclusive());
         assert_eq!(ratio.to_string(), "0.500");
+    }
+
+    #[test]
+    fn ratios_are_to_the_base_beside() {
+        let slow = |factor: f64| vec![10.0 * factor, 20.0 * factor, 30.0 * factor];
+        let turns = Turns {
+            times: vec![slow(1.0), slow(2.0), slow(3.0)],
+            bases: vec![0, 1],
+            beside: vec![
+                vec![vec![], slow(1.0), slow(1.5)],
+                vec![slow(2.0), vec![], slow(2.0)],
+            ],
+        };
+        let near = |subject, base, expected: f64| {
+            let found = turns.ratio(subject, base).median;
+            assert!(
+                (found - expected).abs() < 1e-12,
+                "{subject} to {base}: {found}"
+            );
+        };
+        near(1, 0, 2.0);
+        // Whatever the base took elsewhere: here it was half as slow again.
+        near(2, 0, 2.0);
+        near(2, 1, 1.5);
+        near(0, 1, 0.5);
+        near(1, 1, 1.0);
+        assert!(turns.ratio(0, 2).median.is_nan() && turns.ratio(3, 0).median.is_nan());
+        assert!(turns.settled());
     }
 
     #[test]

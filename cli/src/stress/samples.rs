@@ -1,5 +1,6 @@
 //! Arguments: random ones of the domains, adversarial ones of the domains, and ones outside of them.
 
+use veduta::reference::monte_carlo::splitmix64;
 use veduta_compose::header::{Bound, Interval, Spacing};
 
 use super::subject::{Scalar, Subject};
@@ -13,11 +14,7 @@ pub struct Random(pub u64);
 impl Random {
     /// The next 64 bits.
     pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        splitmix64(&mut self.0)
     }
 
     /// The next number in [0, 1).
