@@ -61,6 +61,17 @@ pub enum Error {
         /// The names that exist.
         known: Vec<String>,
     },
+    /// No atmosphere has this name.
+    #[error("no atmosphere is called `{name}`; there are {}", list(.known))]
+    UnknownAtmosphere {
+        /// The name asked for.
+        name: String,
+        /// The names that exist.
+        known: Vec<String>,
+    },
+    /// A text is not the RON that it should be, or cannot be written as RON.
+    #[error("{0}")]
+    Ron(String),
     /// A value lies outside what is allowed, or is not finite.
     #[error("`{name}` is {value}, but must be {domain}")]
     OutOfDomain {

@@ -5,6 +5,7 @@
 //!
 //! The WGSL is composed while this crate is built; [`programs()`] holds the variants of every shipped scene and preset.
 
+pub mod atmosphere;
 #[cfg(feature = "compose")]
 pub mod compose;
 pub mod device;
@@ -24,6 +25,7 @@ pub mod programs {
     include!(concat!(env!("OUT_DIR"), "/veduta_programs.rs"));
 }
 
+pub use atmosphere::Atmosphere;
 pub use error::Error;
 pub use glam;
 pub use landscape::{Landscape, LandscapeOptions, Resources, Targets, Work};

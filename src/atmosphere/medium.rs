@@ -3,13 +3,21 @@
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
+use super::check::{each_within, fault, within};
+use super::file::AtmosphereFile;
 use crate::error::Error;
+
+/// The most lanes that the device takes: lobes of all layers together.
+pub const MOST_LANES: usize = 8;
+
+/// Words of 32 bits in the block `Air` of `wgsl/atmosphere/medium.wgsl`.
+pub const AIR_WORDS: usize = 148;
 
 /// The air of a planet, the ground below it and the sun above. SI units.
 ///
-/// `Atmosphere::default()` is the Earth, `Atmosphere::named` has more.
+/// `Atmosphere::default()` is the Earth, [`Atmosphere::named`] has more.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "AtmosphereFile", into = "AtmosphereFile")]
 pub struct Atmosphere {
     /// Radius of the ground sphere, in [1e3, 1e9] m.
     pub planet_radius: f64,
@@ -60,18 +68,19 @@ pub enum Profile {
     },
     /// Linear from 0 at the bottom to 1 at the peak and back to 0 at the top.
     Tent {
-        /// Where it begins [m].
+        /// Where it begins, in [-1e7, 1e7] m.
         bottom: f64,
-        /// Where it is densest [m].
+        /// Where it is densest, at least 1 m above the bottom [m].
         peak: f64,
-        /// Where it ends [m].
+        /// Where it ends, at least 1 m above the peak, in [-1e7, 1e7] m.
         top: f64,
     },
-    /// 1 between two altitudes, 0 elsewhere.
+    /// 1 between two altitudes, 0 elsewhere. On the device the density falls to 0 over half a metre outside of them: a
+    /// step has no place there, because altitudes come in steps of 8 mm at 100 km.
     Constant {
-        /// Where it begins [m].
+        /// Where it begins, in [-1e7, 1e7] m.
         bottom: f64,
-        /// Where it ends [m].
+        /// Where it ends, at least 1 m above the bottom, in [-1e7, 1e7] m.
         top: f64,
     },
 }
@@ -117,13 +126,15 @@ pub enum Phase {
     },
 }
 
-/// One lobe: weight (level + square nu^2) (1 + g^2 - 2 g nu)^(-3/2), with the weight left out.
+/// One lobe of a phase function: (level + square nu^2) (1 + g^2 - 2 g nu)^(-3/2), normalised to 1 over the sphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lobe {
-    /// Share of the phase function.
+    /// Share of the phase function, which the numbers below leave out.
     pub weight: f64,
     /// Asymmetry.
     pub g: f64,
+    /// Square over level: Draine's alpha.
+    pub alpha: f64,
     /// Level [1/sr].
     pub level: f64,
     /// Coefficient of nu^2 [1/sr].
@@ -143,6 +154,7 @@ impl Lobe {
         Lobe {
             weight,
             g,
+            alpha,
             level: share * (1.0 - g * g) / (4.0 * PI),
             square: share * alpha * (1.0 - g * g) / (4.0 * PI),
             first: share * (g + alpha * (2.0 * g.powi(3) + 3.0 * g) / 5.0),
@@ -168,9 +180,9 @@ pub fn cornette_shanks_asymmetry(u: f64) -> f64 {
 }
 
 impl Phase {
-    /// The lobes that it is the sum of.
+    /// The lobes that it is the sum of; one without weight is left out.
     pub fn lobes(&self) -> Vec<Lobe> {
-        match *self {
+        let mut lobes = match *self {
             Phase::Isotropic => vec![Lobe::draine(1.0, 0.0, 0.0)],
             Phase::Rayleigh => vec![Lobe::draine(1.0, 0.0, 1.0)],
             Phase::HenyeyGreenstein { g } => vec![Lobe::draine(1.0, g, 0.0)],
@@ -187,7 +199,9 @@ impl Phase {
                 Lobe::draine(1.0 - backward_share, forward, 0.0),
                 Lobe::draine(backward_share, backward, 0.0),
             ],
-        }
+        };
+        lobes.retain(|lobe| lobe.weight > 0.0);
+        lobes
     }
 
     /// Its value for a cosine of the scattering angle, 1 forward [1/sr].
@@ -209,5 +223,312 @@ impl Profile {
             }
             Profile::Constant { bottom, top } => f64::from(u8::from(h >= bottom && h <= top)),
         }
+    }
+}
+
+/// A layer, or one lobe of its phase function.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lane {
+    /// Density with altitude; lobes of one layer have the same.
+    pub profile: Profile,
+    /// Extinction at density 1 [1/m]. The first lane of a layer has that of the whole layer, the others have none.
+    pub extinction: [f64; 3],
+    /// Scattering into this lobe at density 1 [1/m].
+    pub scattering: [f64; 3],
+    /// The lobe, with the weight 1; `None` for a layer that does not scatter.
+    pub lobe: Option<Lobe>,
+}
+
+impl Lane {
+    /// Whether the lobe is so peaked that tables keep its light apart: |g| > 0.3.
+    pub fn peaked(&self) -> bool {
+        self.lobe.is_some_and(|lobe| lobe.g.abs() > 0.3)
+    }
+}
+
+impl Default for Atmosphere {
+    /// The Earth: `earth` of [`Atmosphere::named`].
+    fn default() -> Self {
+        let layer = |name: &str, profile, scattering, absorption, phase| Layer {
+            name: name.to_owned(),
+            profile,
+            scattering,
+            absorption,
+            phase,
+        };
+        let exponential = |scale_height| Profile::Exponential { scale_height };
+        Atmosphere {
+            planet_radius: 6_360_000.0,
+            thickness: 100_000.0,
+            ground_albedo: [0.3; 3],
+            sun: Sun::default(),
+            layers: vec![
+                layer(
+                    "molecules",
+                    exponential(8000.0),
+                    [5.802e-6, 13.558e-6, 33.1e-6],
+                    [0.0; 3],
+                    Phase::Rayleigh,
+                ),
+                layer(
+                    "haze",
+                    exponential(1200.0),
+                    [3.996e-6; 3],
+                    [0.444e-6; 3],
+                    Phase::CornetteShanks { g: 0.8 },
+                ),
+                layer(
+                    "ozone",
+                    Profile::Tent {
+                        bottom: 10_000.0,
+                        peak: 25_000.0,
+                        top: 40_000.0,
+                    },
+                    [0.0; 3],
+                    [0.650e-6, 1.881e-6, 0.085e-6],
+                    Phase::Isotropic,
+                ),
+            ],
+        }
+    }
+}
+
+impl Default for Sun {
+    /// White, as large as from the Earth.
+    fn default() -> Self {
+        Sun {
+            angular_radius: 0.004652,
+            colour: [1.0; 3],
+        }
+    }
+}
+
+impl Profile {
+    /// Altitudes [m] between which the density is smooth.
+    pub fn bends(&self) -> Vec<f64> {
+        match *self {
+            Profile::Exponential { .. } => vec![],
+            Profile::Tent { bottom, peak, top } => vec![bottom, peak, top],
+            Profile::Constant { bottom, top } => vec![bottom, top],
+        }
+    }
+
+    /// The greatest density at and above an altitude.
+    pub fn greatest_above(&self, h: f64) -> f64 {
+        match *self {
+            Profile::Exponential { .. } => self.density(h),
+            Profile::Tent { peak, .. } => self.density(h.max(peak)),
+            Profile::Constant { top, .. } => f64::from(u8::from(h.max(0.0) <= top)),
+        }
+    }
+
+    fn check(&self, name: &str) -> Result<(), Error> {
+        let level = (-1e7, 1e7, "m");
+        let field = |f: &str| format!("{name}.profile.{f}");
+        let above = |upper: (&str, f64), lower: (&str, f64)| {
+            if upper.1 - lower.1 >= 1.0 {
+                return Ok(());
+            }
+            let domain = format!("at least 1 m above `{}`, {:?} m", lower.0, lower.1);
+            Err(fault(&field(upper.0), upper.1, domain))
+        };
+        match *self {
+            Profile::Exponential { scale_height } => {
+                within(&field("scale_height"), scale_height, (1.0, 1e6, "m"))
+            }
+            Profile::Tent { bottom, peak, top } => {
+                for (f, value) in [("bottom", bottom), ("peak", peak), ("top", top)] {
+                    within(&field(f), value, level)?;
+                }
+                above(("peak", peak), ("bottom", bottom))?;
+                above(("top", top), ("peak", peak))
+            }
+            Profile::Constant { bottom, top } => {
+                for (f, value) in [("bottom", bottom), ("top", top)] {
+                    within(&field(f), value, level)?;
+                }
+                above(("top", top), ("bottom", bottom))
+            }
+        }
+    }
+
+    /// Fall, rise, its offset, sink and its offset, as `FourLayers` has them.
+    fn ramps(&self) -> [f64; 5] {
+        match *self {
+            Profile::Exponential { scale_height } => [-1.0 / scale_height, 0.0, 1.0, 0.0, 1.0],
+            Profile::Tent { bottom, peak, top } => {
+                let (rise, sink) = ((peak - bottom).recip(), (top - peak).recip());
+                [0.0, rise, -bottom * rise, -sink, top * sink]
+            }
+            // Slopes of two in a metre are exact; the offsets round by less than a metre's worth.
+            Profile::Constant { bottom, top } => {
+                [0.0, 2.0, 1.0 - 2.0 * bottom, -2.0, 1.0 + 2.0 * top]
+            }
+        }
+    }
+}
+
+impl Phase {
+    fn check(&self, name: &str) -> Result<(), Error> {
+        let field = |f: &str| format!("{name}.phase.{f}");
+        let asymmetry = (-0.99, 0.99, "1");
+        match *self {
+            Phase::Isotropic | Phase::Rayleigh => Ok(()),
+            Phase::HenyeyGreenstein { g } | Phase::CornetteShanks { g } => {
+                within(&field("g"), g, asymmetry)
+            }
+            Phase::CornetteShanksMean { u } => within(&field("u"), u, (-0.98, 0.98, "1")),
+            Phase::Draine { g, alpha } => {
+                within(&field("g"), g, asymmetry)?;
+                within(&field("alpha"), alpha, (0.0, 100.0, "1"))
+            }
+            Phase::TwoLobes {
+                forward,
+                backward,
+                backward_share,
+            } => {
+                within(&field("forward"), forward, asymmetry)?;
+                within(&field("backward"), backward, asymmetry)?;
+                within(&field("backward_share"), backward_share, (0.0, 1.0, "1"))
+            }
+        }
+    }
+}
+
+impl Layer {
+    fn check(&self, index: usize) -> Result<(), Error> {
+        let name = format!("layers[{index}] ({})", self.name);
+        self.profile.check(&name)?;
+        each_within(
+            &format!("{name}.scattering"),
+            self.scattering,
+            (0.0, 1.0, "1/m"),
+        )?;
+        each_within(
+            &format!("{name}.absorption"),
+            self.absorption,
+            (0.0, 1.0, "1/m"),
+        )?;
+        self.phase.check(&name)
+    }
+
+    fn lanes(&self) -> Vec<Lane> {
+        let lane = Lane {
+            profile: self.profile,
+            extinction: std::array::from_fn(|c| self.scattering[c] + self.absorption[c]),
+            scattering: [0.0; 3],
+            lobe: None,
+        };
+        if self.scattering == [0.0; 3] {
+            return vec![lane];
+        }
+        let lobes = self.phase.lobes().into_iter().enumerate();
+        lobes
+            .map(|(i, lobe)| Lane {
+                extinction: if i == 0 { lane.extinction } else { [0.0; 3] },
+                scattering: self.scattering.map(|s| lobe.weight * s),
+                lobe: Some(Lobe {
+                    weight: 1.0,
+                    ..lobe
+                }),
+                ..lane
+            })
+            .collect()
+    }
+}
+
+impl Atmosphere {
+    /// Checks every field against its domain.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for the first one outside.
+    pub fn check(&self) -> Result<(), Error> {
+        within("planet_radius", self.planet_radius, (1e3, 1e9, "m"))?;
+        within("thickness", self.thickness, (1.0, 1e7, "m"))?;
+        each_within("ground_albedo", self.ground_albedo, (0.0, 1.0, "1"))?;
+        within(
+            "sun.angular_radius",
+            self.sun.angular_radius,
+            (0.0, 0.5, "rad"),
+        )?;
+        each_within("sun.colour", self.sun.colour, (0.0, 1000.0, "1"))?;
+        for (index, layer) in self.layers.iter().enumerate() {
+            layer.check(index)?;
+        }
+        let lanes = self.lanes().len();
+        if lanes > MOST_LANES {
+            return Err(Error::OutOfDomain {
+                name: "layers".to_owned(),
+                value: format!("{} with {lanes} lobes", self.layers.len()),
+                domain: format!("layers with at most {MOST_LANES} lobes in all"),
+            });
+        }
+        Ok(())
+    }
+
+    /// Altitude of the top of the air plus the radius of the ground [m].
+    pub fn top_radius(&self) -> f64 {
+        self.planet_radius + self.thickness
+    }
+
+    /// The lanes: every lobe of every layer, and every layer that only absorbs, in order.
+    pub fn lanes(&self) -> Vec<Lane> {
+        self.layers.iter().flat_map(Layer::lanes).collect()
+    }
+
+    /// The lobe that tables leave out of the light of peaked lanes: of those the one with the largest g.
+    pub fn peak(&self) -> Option<Lobe> {
+        let lanes = self.lanes().into_iter();
+        lanes
+            .filter(Lane::peaked)
+            .filter_map(|lane| lane.lobe)
+            .max_by(|a, b| a.g.total_cmp(&b.g))
+    }
+
+    /// The block `Air` of `wgsl/atmosphere/medium.wgsl`, word by word, for a uniform or a storage buffer.
+    ///
+    /// # Errors
+    /// As [`Atmosphere::check`].
+    pub fn air_words(&self) -> Result<[u32; AIR_WORDS], Error> {
+        /// Where the lanes begin, and how many words four of them take.
+        const LANES: usize = 12;
+        const FOUR: usize = 68;
+        self.check()?;
+        let mut words = [0; AIR_WORDS];
+        let bits = |value: f64| (value as f32).to_bits();
+        let lanes = self.lanes();
+        words[0] = bits(self.planet_radius);
+        words[1] = bits(self.thickness);
+        words[2] = lanes.len() as u32;
+        if let Some(peak) = self.peak() {
+            words[3..6].copy_from_slice(&[peak.g, peak.level, peak.square].map(bits));
+        }
+        words[8..11].copy_from_slice(&self.ground_albedo.map(bits));
+        for (i, lane) in lanes.iter().enumerate() {
+            let lobe = lane.lobe.map_or([0.0; 5], |lobe| {
+                [lobe.g, lobe.level, lobe.square, lobe.first, lobe.second]
+            });
+            let numbers = lane
+                .profile
+                .ramps()
+                .into_iter()
+                .chain(lane.extinction)
+                .chain(lane.scattering)
+                .chain(lobe)
+                .chain([f64::from(u8::from(lane.peaked()))]);
+            for (member, number) in numbers.enumerate() {
+                words[LANES + FOUR * (i / 4) + 4 * member + i % 4] = bits(number);
+            }
+        }
+        Ok(words)
+    }
+
+    /// The same as bytes.
+    ///
+    /// # Errors
+    /// As [`Atmosphere::check`].
+    pub fn air_bytes(&self) -> Result<Vec<u8>, Error> {
+        let words = self.air_words()?;
+        Ok(words.iter().flat_map(|word| word.to_le_bytes()).collect())
     }
 }

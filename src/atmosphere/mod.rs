@@ -1,5 +1,12 @@
 //! The air of a planet: what it is made of, the sky that it makes, and the air before a host's own scene.
 
+mod check;
+mod file;
 mod medium;
+mod physics;
 
-pub use medium::{Atmosphere, Layer, Phase, Profile, Sun};
+pub use medium::{
+    AIR_WORDS, Atmosphere, Lane, Layer, Lobe, MOST_LANES, Phase, Profile, Sun,
+    cornette_shanks_asymmetry,
+};
+pub use physics::{Aerosol, Molecules, aerosol_scattering, rayleigh_scattering};

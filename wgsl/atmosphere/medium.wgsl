@@ -11,7 +11,7 @@ struct Lanes {
     high: vec4<f32>,
 }
 
-/// Four layers. The density of a layer is exp(fall h) clamp(min(rise h + rise_offset, set h + set_offset), 0, 1).
+/// Four layers. The density of a layer is exp(fall h) clamp(min(rise h + rise_offset, sink h + sink_offset), 0, 1).
 struct FourLayers {
     /// Minus the reciprocal of the scale height, 0 for a layer that is not exponential [1/m].
     fall: vec4<f32>,
@@ -20,9 +20,9 @@ struct FourLayers {
     /// The lower ramp at altitude 0.
     rise_offset: vec4<f32>,
     /// Slope of the upper ramp [1/m].
-    set: vec4<f32>,
+    sink: vec4<f32>,
     /// The upper ramp at altitude 0.
-    set_offset: vec4<f32>,
+    sink_offset: vec4<f32>,
     /// Extinction of red light at density 1 [1/m].
     extinction_red: vec4<f32>,
     /// Extinction of green light at density 1 [1/m].
@@ -83,7 +83,7 @@ struct AirSample {
 ///
 /// internal
 fn four_densities(layers: FourLayers, h: f32) -> vec4<f32> {
-    let ramps = min(layers.rise * h + layers.rise_offset, layers.set * h + layers.set_offset);
+    let ramps = min(layers.rise * h + layers.rise_offset, layers.sink * h + layers.sink_offset);
     return exp(layers.fall * h) * clamp(ramps, vec4<f32>(0.0), vec4<f32>(1.0));
 }
 
