@@ -4,6 +4,7 @@
 //! in any medium), [`intersect`].
 //! What they stand on: [`monte_carlo`], [`parallel`].
 
+pub mod air_ray;
 pub mod atmosphere;
 pub mod clouds;
 pub mod fractal;
