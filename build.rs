@@ -10,5 +10,8 @@ fn main() {
     let low = std::env::var_os("CARGO_FEATURE_LOW_QUALITY").is_some();
     let default = if low { "thesis_low" } else { "thesis" };
     println!("cargo::metadata=DEFAULT_PRESET={default}");
-    veduta_compose::Build::of_veduta("wgsl", "presets").write();
+    veduta_compose::Build::of_veduta("wgsl", "presets")
+        .variant("sky", ["AERIAL"])
+        .variant("sky", ["AERIAL", "AERIAL_TARGETS"])
+        .write();
 }

@@ -523,6 +523,16 @@ impl Atmosphere {
         Ok(words)
     }
 
+    /// What the table of columns depends on: radius, thickness and profiles, as bytes to compare.
+    pub(crate) fn profile_bytes(&self) -> Vec<u8> {
+        let profiles = self.lanes().into_iter().flat_map(|lane| lane.profile.ramps());
+        [self.planet_radius, self.thickness]
+            .into_iter()
+            .chain(profiles)
+            .flat_map(f64::to_le_bytes)
+            .collect()
+    }
+
     /// The same as bytes.
     ///
     /// # Errors

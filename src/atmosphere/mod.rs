@@ -3,12 +3,16 @@
 mod check;
 mod file;
 mod medium;
+mod fast;
 mod physics;
-mod ray;
+mod tables;
+pub mod ray;
 
 pub use medium::{
     AIR_WORDS, Atmosphere, Lane, Layer, Lobe, MOST_LANES, Phase, Profile, Sun,
     cornette_shanks_asymmetry,
 };
 pub use ray::{AirRay, ProbeRay};
+pub use fast::{FastProbe, RayLight};
+pub use tables::{Eye, SkyQuality, SkyTables};
 pub use physics::{Aerosol, Molecules, aerosol_scattering, rayleigh_scattering};

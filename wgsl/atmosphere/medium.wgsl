@@ -71,14 +71,6 @@ struct Air {
     high: FourLayers,
 }
 
-/// What a place in the air does to light.
-struct AirSample {
-    /// Extinction [1/m].
-    extinction: vec3<f32>,
-    /// Scattering, each lane times its weight [weight/m].
-    scattering: vec3<f32>,
-}
-
 /// Densities of four layers.
 ///
 /// internal

@@ -1,0 +1,191 @@
+//! Light along given rays, read from tables.
+
+use std::collections::BTreeMap;
+
+use crate::error::Error;
+use crate::program::ProgramSet;
+
+use super::Atmosphere;
+use super::ray::ProbeRay;
+use super::tables::{Eye, SkyQuality, SkyTables, bind_groups, compute};
+
+/// Light along a ray, in red, green and blue.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RayLight {
+    /// Radiance scattered into the ray under a point sun of irradiance 1 [1/sr].
+    pub in_scatter: [f32; 3],
+    /// Transmittance to the end of the ray.
+    pub transmittance: [f32; 3],
+}
+
+/// Reads the light along rays from the tables of their eyes.
+#[derive(Debug)]
+pub struct FastProbe {
+    tables: SkyTables,
+    pipeline: wgpu::ComputePipeline,
+    layouts: Vec<wgpu::BindGroupLayout>,
+}
+
+const RAY: usize = 16;
+const RESULT: usize = 32;
+const WORKGROUP: u32 = 64;
+
+impl FastProbe {
+    /// Builds the pipelines.
+    ///
+    /// # Errors
+    /// As [`SkyTables::new`].
+    pub fn new(
+        device: &wgpu::Device,
+        programs: &ProgramSet,
+        atmosphere: &Atmosphere,
+        quality: &SkyQuality,
+    ) -> Result<FastProbe, Error> {
+        let tables = SkyTables::new(device, programs, atmosphere, quality)?;
+        let (pipeline, layouts) = compute(device, programs, "sky_probe", &[])?;
+        Ok(FastProbe {
+            tables,
+            pipeline,
+            layouts,
+        })
+    }
+
+    /// The light along each ray, in their order, under a point sun. Submits and waits. Rays from one altitude under one height
+    /// of the sun share their tables.
+    ///
+    /// # Errors
+    /// As [`Eye::check`]; [`Error::Device`].
+    pub fn run(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        rays: &[ProbeRay],
+    ) -> Result<Vec<RayLight>, Error> {
+        let mut groups: BTreeMap<(u64, u64), Vec<usize>> = BTreeMap::new();
+        for (i, ray) in rays.iter().enumerate() {
+            let key = (ray.altitude.to_bits(), ray.to_sun[1].to_bits());
+            groups.entry(key).or_default().push(i);
+        }
+        let mut results = vec![
+            RayLight {
+                in_scatter: [0.0; 3],
+                transmittance: [1.0; 3]
+            };
+            rays.len()
+        ];
+        for members in groups.values() {
+            let first = rays[members[0]];
+            let flat = first.to_sun[0].hypot(first.to_sun[2]);
+            let eye = Eye {
+                altitude: first.altitude,
+                to_sun: [flat, first.to_sun[1], 0.0],
+                sun_angular_radius: 0.0,
+            };
+            let mut bytes = Vec::with_capacity(members.len() * RAY);
+            for &i in members {
+                // Turned about the vertical until the sun stands over +x.
+                let ray = rays[i];
+                let flat = ray.to_sun[0].hypot(ray.to_sun[2]);
+                let (c, s) = if flat > 0.0 {
+                    (ray.to_sun[0] / flat, ray.to_sun[2] / flat)
+                } else {
+                    (1.0, 0.0)
+                };
+                let [x, y, z] = ray.dir;
+                for number in [c * x + s * z, y, c * z - s * x, ray.distance] {
+                    bytes.extend((number.min(1e30) as f32).to_le_bytes());
+                }
+            }
+            let found = self.run_group(device, queue, &eye, &bytes)?;
+            for (&i, result) in members.iter().zip(found) {
+                results[i] = result;
+            }
+        }
+        Ok(results)
+    }
+
+    fn run_group(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        eye: &Eye,
+        rays: &[u8],
+    ) -> Result<Vec<RayLight>, Error> {
+        let count = rays.len() / RAY;
+        let size = (count * RESULT) as u64;
+        let buffer = |label, size, usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        use wgpu::BufferUsages as Usage;
+        let input = buffer(
+            "veduta rays",
+            rays.len() as u64,
+            Usage::STORAGE | Usage::COPY_DST,
+        );
+        queue.write_buffer(&input, 0, rays);
+        let output = buffer("veduta results", size, Usage::STORAGE | Usage::COPY_SRC);
+        let staging = buffer("veduta read back", size, Usage::COPY_DST | Usage::MAP_READ);
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let _ = self.tables.prepare(queue, &mut encoder, eye)?;
+        let tables = &self.tables;
+        let view = wgpu::BindingResource::TextureView;
+        let groups = bind_groups(
+            device,
+            "veduta probe",
+            &self.layouts,
+            &[
+                &[
+                    (0, tables.air().as_entire_binding()),
+                    (1, tables.eye().as_entire_binding()),
+                ],
+                &[
+                    (0, wgpu::BindingResource::Sampler(tables.sampler())),
+                    (1, view(tables.sky())),
+                    (2, view(tables.aerial())),
+                    (3, view(tables.aerial_depths())),
+                    (4, input.as_entire_binding()),
+                ],
+                &[(0, output.as_entire_binding())],
+            ],
+        );
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&self.pipeline);
+            for (group, index) in groups.iter().zip(0..) {
+                pass.set_bind_group(index, group, &[]);
+            }
+            pass.dispatch_workgroups((count as u32).div_ceil(WORKGROUP), 1, 1);
+        }
+        encoder.copy_buffer_to_buffer(&output, 0, &staging, 0, size);
+        queue.submit([encoder.finish()]);
+        let (sender, receiver) = std::sync::mpsc::channel();
+        staging.slice(..).map_async(wgpu::MapMode::Read, move |r| {
+            // The receiver lives until the answer has come.
+            let _ = sender.send(r);
+        });
+        let lost = |e: &dyn std::fmt::Display| Error::Device(e.to_string());
+        device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|e| lost(&e))?;
+        receiver.recv().map_err(|e| lost(&e))?.map_err(|e| lost(&e))?;
+        let data = staging.slice(..).get_mapped_range().map_err(|e| lost(&e))?;
+        let three = |result: &[u8], at: usize| {
+            [0, 4, 8].map(|k| {
+                let b = &result[at + k..at + k + 4];
+                f32::from_le_bytes([b[0], b[1], b[2], b[3]])
+            })
+        };
+        Ok(data
+            .chunks_exact(RESULT)
+            .map(|result| RayLight {
+                in_scatter: three(result, 0),
+                transmittance: three(result, 16),
+            })
+            .collect())
+    }
+}

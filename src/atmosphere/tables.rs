@@ -1,0 +1,645 @@
+//! The tables of an atmosphere and of one eye in it: made on the device, and made anew only when what they depend on has changed.
+
+use crate::error::Error;
+use crate::landscape::{Resources, Work};
+use crate::program::{Pipeline, PipelineOptions, ProgramSet, ReadyPipeline};
+use crate::programs::blocks::SkyEye as EyeBlock;
+use crate::settings::Settings;
+
+use super::Atmosphere;
+
+/// How finely the tables are made. Sizes are texels; a table's outermost texels hold the ends of its domain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SkyQuality {
+    /// Columns towards the sun: zenith angle by altitude, each in [2, 1024].
+    pub columns: [u32; 2],
+    /// Diffuse light: sun's height by altitude, each in [2, 1024].
+    pub diffuse: [u32; 2],
+    /// Sky: azimuth by height above the horizon, each in [2, 1024].
+    pub sky: [u32; 2],
+    /// Groups of eight points on each stretch of a ray of the sky, in [1, 4].
+    pub sky_panels: u32,
+    /// Air before things: azimuth by height above and below the horizon; [2, 1024] and an even number in [4, 1024].
+    pub aerial: [u32; 2],
+    /// Distances of the air before things, in [2, 128].
+    pub aerial_slices: u32,
+    /// Steps between two of them, in [1, 8].
+    pub aerial_steps: u32,
+    /// Whether light of all orders of scattering is in the tables, or of the first alone.
+    pub all_orders: bool,
+}
+
+impl SkyQuality {
+    /// What a preset asks for.
+    pub fn of(settings: &Settings) -> SkyQuality {
+        let number = |name: &str| settings.number(name).unwrap_or(1.0) as u32;
+        SkyQuality {
+            columns: [number("COLUMNS_WIDTH"), number("COLUMNS_HEIGHT")],
+            diffuse: [number("DIFFUSE_WIDTH"), number("DIFFUSE_HEIGHT")],
+            sky: [number("SKY_WIDTH"), number("SKY_HEIGHT")],
+            sky_panels: number("SKY_PANELS"),
+            aerial: [number("AERIAL_WIDTH"), number("AERIAL_HEIGHT")],
+            aerial_slices: number("AERIAL_SLICES"),
+            aerial_steps: number("AERIAL_STEPS"),
+            all_orders: number("ALL_ORDERS") != 0,
+        }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] that names the field, its value and what is allowed.
+    pub fn check(&self) -> Result<(), Error> {
+        let within = |name: &str, value: u32, from: u32, to: u32| {
+            if (from..=to).contains(&value) {
+                return Ok(());
+            }
+            Err(Error::OutOfDomain {
+                name: format!("sky_quality.{name}"),
+                value: value.to_string(),
+                domain: format!("in [{from}, {to}]"),
+            })
+        };
+        for (name, size) in [
+            ("columns", self.columns),
+            ("diffuse", self.diffuse),
+            ("sky", self.sky),
+            ("aerial", self.aerial),
+        ] {
+            within(name, size[0], 2, 1024)?;
+            within(name, size[1], 2, 1024)?;
+        }
+        within("aerial_slices", self.aerial_slices, 2, 128)?;
+        within("sky_panels", self.sky_panels, 1, 4)?;
+        within("aerial_steps", self.aerial_steps, 1, 8)?;
+        if self.aerial[1] < 4 || self.aerial[1] % 2 == 1 {
+            return Err(Error::OutOfDomain {
+                name: "sky_quality.aerial".to_owned(),
+                value: self.aerial[1].to_string(),
+                domain: "an even number of rows, at least 4".to_owned(),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Where an eye is, as far as the tables depend on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Eye {
+    /// Altitude in [0, 1e9] m.
+    pub altitude: f64,
+    /// Unit vector to the sun, y up at the eye.
+    pub to_sun: [f64; 3],
+    /// Angular radius of the sun in [0, 0.5] rad; 0 for a point.
+    pub sun_angular_radius: f64,
+}
+
+impl Eye {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] that names the field, its value and what is allowed.
+    pub fn check(&self) -> Result<(), Error> {
+        let fault = |name: &str, value: String, domain: &str| {
+            Err(Error::OutOfDomain {
+                name: format!("eye.{name}"),
+                value,
+                domain: domain.to_owned(),
+            })
+        };
+        if !(0.0..=1e9).contains(&self.altitude) {
+            return fault("altitude", self.altitude.to_string(), "in [0, 1e9] m");
+        }
+        let length = self.to_sun.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if (length - 1.0).abs() > 1e-3 || length.is_nan() {
+            return fault("to_sun", format!("{:?}", self.to_sun), "a unit vector");
+        }
+        if !(0.0..=0.5).contains(&self.sun_angular_radius) {
+            return fault(
+                "sun_angular_radius",
+                self.sun_angular_radius.to_string(),
+                "in [0, 0.5] rad",
+            );
+        }
+        Ok(())
+    }
+}
+
+/// A texture with a view of all of it.
+#[derive(Debug)]
+struct Table {
+    texture: wgpu::Texture,
+    view: wgpu::TextureView,
+}
+
+impl Table {
+    fn new(device: &wgpu::Device, label: &str, [width, height]: [u32; 2], layers: Option<u32>) -> Table {
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: layers.unwrap_or(1),
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba16Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::STORAGE_BINDING
+                | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(if layers.is_some() {
+                wgpu::TextureViewDimension::D2Array
+            } else {
+                wgpu::TextureViewDimension::D2
+            }),
+            ..Default::default()
+        });
+        Table { texture, view }
+    }
+
+    fn bytes(&self) -> u64 {
+        let size = self.texture.size();
+        8 * u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers)
+    }
+}
+
+/// A pass over a table.
+#[derive(Debug)]
+struct Bake {
+    pipeline: wgpu::ComputePipeline,
+    groups: Vec<wgpu::BindGroup>,
+    workgroups: [u32; 2],
+}
+
+impl Bake {
+    fn record(&self, encoder: &mut wgpu::CommandEncoder, label: &str) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some(label),
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.pipeline);
+        for (group, index) in self.groups.iter().zip(0..) {
+            pass.set_bind_group(index, group, &[]);
+        }
+        pass.dispatch_workgroups(self.workgroups[0], self.workgroups[1], 1);
+    }
+}
+
+/// What a binding gets.
+type Bound<'a> = &'a [(u32, wgpu::BindingResource<'a>)];
+
+/// Bind groups for a program's layouts, from what each group's bindings get.
+pub(super) fn bind_groups(
+    device: &wgpu::Device,
+    label: &str,
+    layouts: &[wgpu::BindGroupLayout],
+    bound: &[Bound<'_>],
+) -> Vec<wgpu::BindGroup> {
+    layouts
+        .iter()
+        .zip(bound)
+        .map(|(layout, resources)| {
+            let entries: Vec<wgpu::BindGroupEntry<'_>> = resources
+                .iter()
+                .map(|(binding, resource)| wgpu::BindGroupEntry {
+                    binding: *binding,
+                    resource: resource.clone(),
+                })
+                .collect();
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some(label),
+                layout,
+                entries: &entries,
+            })
+        })
+        .collect()
+}
+
+/// The pipeline of a compute program with its layouts.
+pub(super) fn compute(
+    device: &wgpu::Device,
+    programs: &ProgramSet,
+    name: &str,
+    constants: &[(&str, f64)],
+) -> Result<(wgpu::ComputePipeline, Vec<wgpu::BindGroupLayout>), Error> {
+    let ReadyPipeline {
+        pipeline,
+        bind_group_layouts,
+    } = programs.get(name, &[])?.pipeline(
+        device,
+        &PipelineOptions {
+            constants,
+            ..Default::default()
+        },
+    )?;
+    match pipeline {
+        Pipeline::Compute(pipeline) => Ok((pipeline, bind_group_layouts)),
+        Pipeline::Render(_) => Err(Error::MissingStage {
+            program: name.to_owned(),
+        }),
+    }
+}
+
+/// The tables of one atmosphere and one eye.
+///
+/// - *Columns*: metres of every layer between a place and the sun; depends on the radius, the thickness and the profiles.
+/// - *Diffuse light*: moments of the light of all orders around a place; depends on the layers and the ground.
+/// - *Sky* and *air before things*: radiance in the directions of one eye; depend on the above, the eye's altitude, the sun's
+///   height and its angular radius. Turning the eye, or the sun about the vertical, makes nothing anew.
+///
+/// All are `Rgba16Float`; payload, units and mapping stand in the modules `veduta::atmosphere::{columns, diffuse, sky_view,
+/// aerial}`.
+#[derive(Debug)]
+pub struct SkyTables {
+    atmosphere: Atmosphere,
+    quality: SkyQuality,
+    air: wgpu::Buffer,
+    eye: wgpu::Buffer,
+    sampler: wgpu::Sampler,
+    columns: Table,
+    moments: [Table; 3],
+    sky: Table,
+    aerial: Table,
+    depths: Table,
+    bake_columns: Bake,
+    bake_moments: Vec<Bake>,
+    bake_sky: Bake,
+    bake_aerial: Bake,
+    /// What the buffer `air` holds.
+    air_bytes: Vec<u8>,
+    /// What the buffer `eye` holds.
+    eye_bytes: Vec<u8>,
+    columns_of: Option<Vec<u8>>,
+    moments_of: Option<Vec<u8>>,
+    eye_of: Option<EyeKey>,
+}
+
+/// What the tables of an eye depend on, besides the air.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct EyeKey {
+    altitude: f32,
+    sun_height: f32,
+    sun_angular_radius: f32,
+}
+
+impl SkyTables {
+    /// Makes textures and pipelines; the tables themselves are made by the first [`SkyTables::prepare`].
+    ///
+    /// # Errors
+    /// As [`Atmosphere::check`] and [`SkyQuality::check`], and the faults of [`ProgramSet::get`] and of making pipelines.
+    pub fn new(
+        device: &wgpu::Device,
+        programs: &ProgramSet,
+        atmosphere: &Atmosphere,
+        quality: &SkyQuality,
+    ) -> Result<SkyTables, Error> {
+        quality.check()?;
+        let bytes = atmosphere.air_bytes()?;
+        let buffer = |label, size| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let air = buffer("veduta air", bytes.len() as u64);
+        let eye = buffer("veduta eye", EyeBlock::SIZE as u64);
+        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("veduta tables"),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
+        });
+        // A second layer for lanes 4 to 7 is there in any case: eight lanes are a matter of content.
+        let columns = Table::new(device, "veduta columns", quality.columns, Some(2));
+        let moments =
+            [1, 2, 3].map(|_| Table::new(device, "veduta diffuse light", quality.diffuse, Some(2)));
+        let sky = Table::new(device, "veduta sky", quality.sky, Some(2));
+        let aerial = Table::new(
+            device,
+            "veduta air before things",
+            quality.aerial,
+            Some(2 * quality.aerial_slices),
+        );
+        let depths = Table::new(
+            device,
+            "veduta depths",
+            [quality.aerial_slices, quality.aerial[1]],
+            None,
+        );
+        let air_bound = (0, air.as_entire_binding());
+        let eye_bound = (1, eye.as_entire_binding());
+        let linear = (0, wgpu::BindingResource::Sampler(&sampler));
+        fn at(binding: u32, table: &Table) -> (u32, wgpu::BindingResource<'_>) {
+            (binding, wgpu::BindingResource::TextureView(&table.view))
+        }
+        let groups_of = |size: [u32; 2], of: [u32; 2]| [size[0].div_ceil(of[0]), size[1].div_ceil(of[1])];
+
+        let (pipeline, layouts) = compute(device, programs, "air_columns", &[])?;
+        let bake_columns = Bake {
+            pipeline,
+            groups: bind_groups(
+                device,
+                "veduta columns",
+                &layouts,
+                &[&[air_bound.clone()], &[], &[at(0, &columns)]],
+            ),
+            workgroups: groups_of(quality.columns, [8, 8]),
+        };
+        let mut bake_moments = Vec::new();
+        // The first order reads no other; the others read the one before, the third both. What is not read is any table but the one written.
+        for (order, [before, earlier, written]) in [(1, [1, 2, 0]), (2, [0, 2, 1]), (3, [1, 0, 2])] {
+            let (pipeline, layouts) = compute(
+                device,
+                programs,
+                "air_diffuse",
+                &[("SCATTERING_ORDER", f64::from(order))],
+            )?;
+            bake_moments.push(Bake {
+                pipeline,
+                groups: bind_groups(
+                    device,
+                    "veduta diffuse light",
+                    &layouts,
+                    &[
+                        &[air_bound.clone()],
+                        &[
+                            linear.clone(),
+                            at(1, &columns),
+                            at(2, &moments[before]),
+                            at(3, &moments[earlier]),
+                        ],
+                        &[at(0, &moments[written])],
+                    ],
+                ),
+                workgroups: groups_of(quality.diffuse, [4, 4]),
+            });
+        }
+        let all = f64::from(u8::from(quality.all_orders));
+        let (pipeline, layouts) = compute(
+            device,
+            programs,
+            "sky_view",
+            &[
+                ("SKY_PANELS", f64::from(quality.sky_panels)),
+                ("ALL_ORDERS", all),
+            ],
+        )?;
+        let read = [linear.clone(), at(1, &columns), at(2, &moments[2])];
+        let bake_sky = Bake {
+            pipeline,
+            groups: bind_groups(
+                device,
+                "veduta sky",
+                &layouts,
+                &[
+                    &[air_bound.clone(), eye_bound.clone()],
+                    &read,
+                    &[at(0, &sky)],
+                ],
+            ),
+            workgroups: groups_of(quality.sky, [8, 8]),
+        };
+        let (pipeline, layouts) = compute(
+            device,
+            programs,
+            "sky_aerial",
+            &[
+                ("AERIAL_STEPS", f64::from(quality.aerial_steps)),
+                ("ALL_ORDERS", all),
+            ],
+        )?;
+        let bake_aerial = Bake {
+            pipeline,
+            groups: bind_groups(
+                device,
+                "veduta air before things",
+                &layouts,
+                &[
+                    &[air_bound, eye_bound],
+                    &read,
+                    &[at(0, &aerial), at(1, &depths)],
+                ],
+            ),
+            workgroups: groups_of(quality.aerial, [4, 8]),
+        };
+        drop(read);
+        Ok(SkyTables {
+            atmosphere: atmosphere.clone(),
+            quality: *quality,
+            air,
+            eye,
+            sampler,
+            columns,
+            moments,
+            sky,
+            aerial,
+            depths,
+            bake_columns,
+            bake_moments,
+            bake_sky,
+            bake_aerial,
+            air_bytes: Vec::new(),
+            eye_bytes: Vec::new(),
+            columns_of: None,
+            moments_of: None,
+            eye_of: None,
+        })
+    }
+
+    /// The air that the tables are of.
+    pub fn atmosphere(&self) -> &Atmosphere {
+        &self.atmosphere
+    }
+
+    /// How finely they are made.
+    pub fn quality(&self) -> &SkyQuality {
+        &self.quality
+    }
+
+    /// Changes the air; the next [`SkyTables::prepare`] makes anew what depends on the change.
+    ///
+    /// # Errors
+    /// As [`Atmosphere::check`].
+    pub fn set_atmosphere(&mut self, atmosphere: &Atmosphere) -> Result<(), Error> {
+        atmosphere.check()?;
+        self.atmosphere = atmosphere.clone();
+        Ok(())
+    }
+
+    /// Uploads what has changed and records what has to be made anew for an eye.
+    ///
+    /// # Errors
+    /// As [`Eye::check`].
+    pub fn prepare(
+        &mut self,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        eye: &Eye,
+    ) -> Result<Work, Error> {
+        eye.check()?;
+        let mut work = Work::default();
+        let mut upload = |buffer: &wgpu::Buffer, held: &mut Vec<u8>, bytes: Vec<u8>| {
+            if *held != bytes {
+                queue.write_buffer(buffer, 0, &bytes);
+                work.writes += 1;
+                work.bytes += bytes.len() as u64;
+                *held = bytes;
+            }
+        };
+        upload(&self.air, &mut self.air_bytes, self.atmosphere.air_bytes()?);
+        let block = self.eye_block(eye);
+        upload(&self.eye, &mut self.eye_bytes, block.to_bytes().to_vec());
+        let mut bake = |bake: &Bake, label: &str| {
+            bake.record(encoder, label);
+            work.bakes += 1;
+            work.dispatches += 1;
+        };
+        let shape = self.atmosphere.profile_bytes();
+        let columns_anew = self.columns_of.as_ref() != Some(&shape);
+        if columns_anew {
+            bake(&self.bake_columns, "veduta columns");
+            self.columns_of = Some(shape);
+        }
+        let air_anew = self.moments_of.as_ref() != Some(&self.air_bytes);
+        if air_anew {
+            if self.quality.all_orders {
+                for pass in &self.bake_moments {
+                    bake(pass, "veduta diffuse light");
+                }
+            }
+            self.moments_of = Some(self.air_bytes.clone());
+        }
+        let key = EyeKey {
+            altitude: block.altitude,
+            sun_height: block.to_sun[1],
+            sun_angular_radius: block.sun_angular_radius,
+        };
+        if air_anew || self.eye_of != Some(key) {
+            bake(&self.bake_sky, "veduta sky");
+            bake(&self.bake_aerial, "veduta air before things");
+            self.eye_of = Some(key);
+        }
+        Ok(work)
+    }
+
+    fn eye_block(&self, eye: &Eye) -> EyeBlock {
+        let radius = self.atmosphere.planet_radius;
+        let r = radius + eye.altitude;
+        let sine = radius / r;
+        let cosine = -(eye.altitude * (2.0 * radius + eye.altitude)).sqrt() / r;
+        let length = eye.to_sun.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let to_sun = eye.to_sun.map(|c| c / length);
+        EyeBlock {
+            to_sun: to_sun.map(|c| c as f32),
+            altitude: eye.altitude as f32,
+            horizon: (sine / (1.0 + cosine)) as f32,
+            ground_radius: radius as f32,
+            top: self.atmosphere.thickness as f32,
+            scale: table_scale(&self.atmosphere, eye.altitude, to_sun[1]),
+            sun_angular_radius: eye.sun_angular_radius as f32,
+            ..EyeBlock::ZERO
+        }
+    }
+
+    /// What the tables keep on the device.
+    pub fn resources(&self) -> Resources {
+        let tables = [&self.columns, &self.sky, &self.aerial, &self.depths];
+        let tables: Vec<&Table> = tables.into_iter().chain(&self.moments).collect();
+        let bakes = [&self.bake_columns, &self.bake_sky, &self.bake_aerial];
+        let bakes: Vec<&Bake> = bakes.into_iter().chain(&self.bake_moments).collect();
+        Resources {
+            pipelines: bakes.len() as u32,
+            bind_groups: bakes.iter().map(|b| b.groups.len() as u32).sum(),
+            bindings: 2 + 3 * 5 + 2 * 6 + 1,
+            buffers: 2,
+            buffer_bytes: self.air.size() + self.eye.size(),
+            textures: tables.len() as u32,
+            texture_bytes: tables.iter().map(|t| t.bytes()).sum(),
+            samplers: 1,
+        }
+    }
+
+    /// The block `Air` of the modules.
+    pub fn air(&self) -> &wgpu::Buffer {
+        &self.air
+    }
+
+    /// The block `SkyEye` of the modules.
+    pub fn eye(&self) -> &wgpu::Buffer {
+        &self.eye
+    }
+
+    /// The sampler that the tables are read with.
+    pub fn sampler(&self) -> &wgpu::Sampler {
+        &self.sampler
+    }
+
+    /// The table of columns.
+    pub fn columns(&self) -> &wgpu::TextureView {
+        &self.columns.view
+    }
+
+    /// The table of diffuse light.
+    pub fn diffuse(&self) -> &wgpu::TextureView {
+        &self.moments[2].view
+    }
+
+    /// The table of the sky.
+    pub fn sky(&self) -> &wgpu::TextureView {
+        &self.sky.view
+    }
+
+    /// The light of the air before things.
+    pub fn aerial(&self) -> &wgpu::TextureView {
+        &self.aerial.view
+    }
+
+    /// The mean extinction of the air before things.
+    pub fn aerial_depths(&self) -> &wgpu::TextureView {
+        &self.depths.view
+    }
+}
+
+/// What radiance in the tables of an eye is multiplied with, a power of two: so that half precision is enough from noon to night. It
+/// follows an estimate, in f64, of the brightest light that the eye sees scattered once.
+fn table_scale(atmosphere: &Atmosphere, altitude: f64, sun_mu: f64) -> f32 {
+    let lanes = atmosphere.lanes();
+    let radius = atmosphere.planet_radius;
+    let top = atmosphere.thickness;
+    let sun_sine = (1.0 - sun_mu * sun_mu).max(0.0).sqrt();
+    // Places in the plane of the sun, as altitude and angle from the eye about the planet's centre towards the sun.
+    let mut brightest = 0.0_f64;
+    for step in -8..=8 {
+        // As far as an eye on the ground, or one above the limb, may see.
+        let reach = (radius / (radius + altitude.max(1.0))).acos() + (radius / (radius + top)).acos();
+        let angle = reach * f64::from(step) / 8.0;
+        let there_mu = sun_mu * angle.cos() + sun_sine * angle.sin();
+        for level in 0..12 {
+            let h = top * (f64::from(level) / 12.0).powi(2);
+            let horizon = -(h * (2.0 * radius + h)).sqrt() / (radius + h);
+            if there_mu < horizon {
+                continue;
+            }
+            let slant = 1.0 / (there_mu - horizon + 0.03);
+            let (mut scattered, mut depth) = (0.0, 0.0);
+            for lane in &lanes {
+                let density = lane.profile.density(h);
+                let depth_scale = match lane.profile {
+                    super::Profile::Exponential { scale_height } => scale_height,
+                    _ => 0.1 * top,
+                };
+                scattered += lane.scattering[1] * density * depth_scale;
+                depth += lane.extinction[1] * density * depth_scale * slant;
+            }
+            brightest = brightest.max(scattered * (-depth).exp());
+        }
+    }
+    let exponent = -brightest.max(1e-9).log2().round().clamp(-40.0, 4.0);
+    exponent.exp2() as f32
+}

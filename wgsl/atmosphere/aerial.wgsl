@@ -1,0 +1,78 @@
+//! The table of the air before things, as seen from one eye: by direction and by distance.
+//! source   Hillaire2020 (a volume per eye); in the sky's own directions, so that turning the eye costs nothing, and means over the distance, which vary little: ours
+//! symbols  t distance from the start of the ray in the air [m] · length that to the ray's end [m] · slice sqrt(t / length)
+//!
+//! A texel of the light's table belongs to an azimuth from the sun (x), a height above or depth below the horizon (y: the lower half of the rows is above the
+//! horizon, the upper below) and a slice, and holds radiance scattered in between for a sun of irradiance 1, over the distance and times scale and thickness of the air:
+//! in the first half of the array layers but for peaked light [1/sr], in the second peaked light over the peaked phase function [1]. The table of depths holds, by
+//! slice (x) and height (y), the mean extinction times the thickness of the air [1].
+#define_import_path veduta::atmosphere::aerial
+
+#import veduta::atmosphere::medium::{Air, peak_phase}
+#import veduta::atmosphere::ray::{AirLight}
+#import veduta::atmosphere::sky_view::{SkyEye, SkyPlace}
+
+/// Row of the tables, in [0, 1], of a height above or below the horizon in [0, 1], when there are `rows` rows: the halves never mix.
+///
+/// domain  y in [0, 1] 1 lin
+/// domain  rows in [4, 1024] 1 log
+/// range   [0, 1] 1
+/// error   2e-7 abs of reference::air_tables::aerial_row
+/// source  elementary
+fn aerial_row(y: f32, below: bool, rows: f32) -> f32 {
+    let half = 0.5 * rows;
+    return (y * (half - 1.0) + 0.5 + select(0.0, half, below)) / rows;
+}
+
+/// Distance of a slice, in [0, 1], of a ray.
+///
+/// domain  slice in [0, 1] 1 lin
+/// domain  length in [0, 2e6] m lin
+/// range   [0, 2e6] m
+/// error   2e-7 rel of reference::air_tables::aerial_distance
+/// monotone slice
+/// source  Hillaire2020 (squared slices)
+fn aerial_distance(slice: f32, length: f32) -> f32 {
+    return length * slice * slice;
+}
+
+/// Slice of a distance: the inverse of `aerial_distance`; 1 beyond the end.
+///
+/// domain  t in [0, 2e6] m lin
+/// domain  length in [1, 2e6] m log
+/// range   [0, 1] 1
+/// error   2e-7 abs of reference::air_tables::aerial_slice
+/// monotone t
+/// source  as aerial_distance
+fn aerial_slice(t: f32, length: f32) -> f32 {
+    return sqrt(clamp(t / max(length, 1e-20), 0.0, 1.0));
+}
+
+/// Light and transmittance of the air from an eye to the distance `t` from where the ray enters the air, for the direction's place in the tables of the eye and the whole length
+/// of the ray. Beyond the end it is that of the end.
+///
+/// domain  t in [0, 2e6] m lin
+/// domain  length in [1, 2e6] m log
+/// domain  place.x in [0, 1] 1 lin
+/// domain  place.y in [0, 1] 1 lin
+/// domain  place.nu in [-1, 1] 1 lin
+/// domain  eye.scale in [1, 1e6] 1 log
+/// range   [0, 1e6] 1/sr
+/// error   0.02 rel of reference::air_tables::aerial_light
+/// source  Hillaire2020
+fn aerial_light(light: texture_2d_array<f32>, depths: texture_2d<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace, t: f32, length: f32) -> AirLight {
+    let reached = clamp(t, 0.0, length);
+    let slice = aerial_slice(reached, length);
+    let size = vec2<f32>(textureDimensions(light));
+    let slices = i32(textureNumLayers(light)) / 2;
+    let row = aerial_row(place.y, place.below, size.y);
+    let at = vec2<f32>((place.x * (size.x - 1.0) + 0.5) / size.x, row);
+    let between = slice * f32(slices - 1);
+    let near = min(i32(between), slices - 2);
+    let far_share = between - f32(near);
+    let smooth_light = mix(textureSampleLevel(light, linear, at, near, 0.0).rgb, textureSampleLevel(light, linear, at, near + 1, 0.0).rgb, far_share);
+    let peaked = mix(textureSampleLevel(light, linear, at, slices + near, 0.0).rgb, textureSampleLevel(light, linear, at, slices + near + 1, 0.0).rgb, far_share);
+    let mean_depth = textureSampleLevel(depths, linear, vec2<f32>((between + 0.5) / f32(slices), row), 0.0).rgb;
+    let share = reached / air.top;
+    return AirLight((smooth_light + peaked * peak_phase(air, place.nu)) * (share / eye.scale), exp(-mean_depth * share));
+}

@@ -1,0 +1,116 @@
+//! Orders of scattering: the moments of the light around a place, out of the sun or out of the moments of the order before.
+//! source   successive orders of scattering (Hansen1974), with the curvature of the planet along every ray: ours
+//! symbols  h altitude [m] · sun_mu zenith cosine of the sun · mu zenith cosine of a direction
+#define_import_path veduta::atmosphere::orders
+
+#import veduta::atmosphere::medium::{Air, air_densities, air_extinction, air_scattering, air_phases}
+#import veduta::atmosphere::columns::{horizon_cosine, sun_depth, sun_above_horizon}
+#import veduta::atmosphere::diffuse::{Moments, diffuse_moments, diffuse_source, level_irradiance}
+#import veduta::atmosphere::scatter::{step_length}
+#import veduta::planet::shell::{altitude_along, top_distance, ground_distance}
+#import veduta::math::gauss::{gauss_five, gauss_eight}
+
+/// Radiance that the ground reflects where the sun's zenith cosine is `sun_mu`: of light straight from the sun, or of the light whose moments are given.
+///
+/// internal
+fn ground_light(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, linear: sampler, air: Air, sun_mu: f32, from_sun: bool) -> vec3<f32> {
+    var irradiance = vec3<f32>(0.0);
+    if from_sun {
+        if sun_mu > 0.0 {
+            irradiance = exp(-sun_depth(columns, linear, air, 0.0, sun_mu)) * sun_mu;
+        }
+    } else {
+        irradiance = level_irradiance(diffuse_moments(moments, linear, air.top, 0.0, sun_mu));
+    }
+    return air.ground_albedo * irradiance * 0.31830989;
+}
+
+/// Moments of light scattered or reflected just once more: out of the sun's own light, or out of the light whose moments the table holds.
+///
+/// domain  h in [0, 1e5] m lin
+/// domain  sun_mu in [-0.4, 1] 1 lin
+/// range   [-10, 10] 1
+/// error   0.03 rel of reference::air_tables::order_moments
+/// source  ours
+fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, linear: sampler, air: Air, h: f32, sun_mu: f32, from_sun: bool) -> Moments {
+    let r = air.ground_radius + h;
+    let horizon = horizon_cosine(air.ground_radius, h);
+    let sun_sine = sqrt(max(1.0 - sun_mu * sun_mu, 1e-8));
+    var whole = vec3<f32>(0.0);
+    var up = 0.0;
+    var more = vec4<f32>(0.0);
+    for (var i = 0; i < 10; i++) {
+        let polar = gauss_five(i % 5);
+        let below = i >= 5;
+        // Dense at the horizon on both of its sides.
+        let span = select(1.0 - horizon, -1.0 - horizon, below);
+        let mu = horizon + span * (polar.x * polar.x);
+        let sine = sqrt(max(1.0 - mu * mu, 0.0));
+        let solid = abs(span) * 2.0 * polar.x * polar.y * 2.0943951;
+        var end = top_distance(air.ground_radius, air.top, h, mu);
+        if below {
+            // A ray just below the horizon meets the ground where it runs level.
+            let met = ground_distance(air.ground_radius, h, mu);
+            end = select(met, -r * mu, met < 0.0);
+        }
+        for (var j = 0; j < 3; j++) {
+            let cos_phi = 0.8660254 * f32(1 - j);
+            let nu = mu * sun_mu + sine * sun_sine * cos_phi;
+            let phases = air_phases(air, nu);
+            var depth = vec3<f32>(0.0);
+            var light = vec3<f32>(0.0);
+            for (var k = 0; k < 8; k++) {
+                let node = gauss_eight(1, k);
+                let t = end * node.x * node.x;
+                let distance = end * 2.0 * node.x * node.y;
+                let altitude = max(altitude_along(air.ground_radius, h, mu, t), 0.0);
+                let there_mu = clamp((r * mu + t) / (air.ground_radius + altitude), -1.0, 1.0);
+                let there_sun = clamp((r * sun_mu + t * nu) / (air.ground_radius + altitude), -1.0, 1.0);
+                let densities = air_densities(air, altitude);
+                let extinction = air_extinction(air, densities);
+                var source = vec3<f32>(0.0);
+                if from_sun {
+                    let lit = sun_above_horizon(air.ground_radius, altitude, there_sun, 0.005);
+                    if lit > 0.0 {
+                        let sun = lit * exp(-sun_depth(columns, linear, air, altitude, there_sun));
+                        source = sun * air_scattering(air, densities, phases);
+                    }
+                } else {
+                    let glow = diffuse_moments(moments, linear, air.top, altitude, there_sun);
+                    source = diffuse_source(air, densities, glow, there_mu, there_sun, nu);
+                }
+                light += source * step_length(depth, extinction, distance);
+                depth += extinction * distance;
+            }
+            if below {
+                let there_sun = clamp((r * sun_mu + end * nu) / air.ground_radius, -1.0, 1.0);
+                light += exp(-depth) * ground_light(columns, moments, linear, air, there_sun, from_sun);
+            }
+            let weighted = light * solid;
+            let mean = dot(weighted, vec3<f32>(1.0 / 3.0));
+            let x = sine * cos_phi / sun_sine;
+            whole += weighted;
+            up += mean * mu;
+            more += mean * vec4<f32>(x, 1.5 * mu * mu - 0.5, mu * x, sine * sine * (2.0 * cos_phi * cos_phi - 1.0) / (sun_sine * sun_sine));
+        }
+    }
+    let over = 1.0 / max(dot(whole, vec3<f32>(1.0 / 3.0)), 1e-30);
+    return Moments(whole, up * over, more * over);
+}
+
+/// Light of all orders from the third on, when `last` is the light of the third order and `before` that of the second: a geometric series, whose ratio is at most 0.95.
+///
+/// domain  before.whole in [0, 10] 1 lin
+/// domain  last.whole in [0, 10] 1 lin
+/// domain  before.up in [-1, 1] 1 lin
+/// domain  last.up in [-1, 1] 1 lin
+/// domain  before.more in [-1, 1] 1 lin
+/// domain  last.more in [-1, 1] 1 lin
+/// range   [-10, 200] 1
+/// error   1e-4 rel of reference::air_tables::further_orders
+/// outside undefined
+/// source  geometric series
+fn further_orders(before: Moments, last: Moments) -> Moments {
+    let ratio = clamp(last.whole / max(before.whole, vec3<f32>(1e-30)), vec3<f32>(0.0), vec3<f32>(0.95));
+    return Moments(last.whole / (1.0 - ratio), last.up, last.more);
+}

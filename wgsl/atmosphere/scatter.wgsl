@@ -1,0 +1,160 @@
+//! Light scattered into a ray, with the sun's light and the air's own glow read from tables: what the tables of sky and air are made by.
+//! source   Nishita1993; energy-conserving steps Hillaire2015; split at shadow, lowest point and ends: ours
+//! symbols  t distance along the ray [m] · peaked light: that of layers with a peaked phase function, over the phase function of Air.peak
+#define_import_path veduta::atmosphere::scatter
+
+#import veduta::atmosphere::medium::{Air, Lanes, air_densities, air_extinction, air_scattering, air_phases, peak_phase}
+#import veduta::atmosphere::ray::{AirRay, ray_altitude, ray_sun_cosine, lowest_distance}
+#import veduta::atmosphere::columns::{sun_depth, sun_above_horizon}
+#import veduta::atmosphere::diffuse::{diffuse_moments, diffuse_source}
+#import veduta::math::gauss::{gauss_eight}
+
+/// Light scattered into a ray.
+struct Scattered {
+    /// Radiance but for peaked light [1/sr].
+    smooth_light: vec3<f32>,
+    /// Radiance of peaked light over the peaked phase function [1].
+    peaked_light: vec3<f32>,
+    /// Optical depth.
+    depth: vec3<f32>,
+}
+
+/// Sources of light at a place of a ray.
+struct AirSource {
+    /// But for peaked light [1/(sr m)].
+    smooth_light: vec3<f32>,
+    /// Peaked light over the peaked phase function [1/m].
+    peaked_light: vec3<f32>,
+    /// Extinction [1/m].
+    extinction: vec3<f32>,
+}
+
+/// The phase functions of a ray, split into those of smooth and peaked layers.
+struct SplitPhases {
+    /// 0 for peaked lanes [1/sr].
+    smooth_lanes: Lanes,
+    /// Over the peaked phase function, 0 for smooth lanes [1].
+    peaked_lanes: Lanes,
+}
+
+/// Splits the phase functions for a cosine `nu` of the scattering angle.
+///
+/// domain  nu in [-1, 1] 1 lin
+/// range   [0, 100] 1
+/// error   2e-4 rel of reference::air_tables::split_phases
+/// source  ours
+fn split_phases(air: Air, nu: f32) -> SplitPhases {
+    let phases = air_phases(air, nu);
+    let over = 1.0 / max(peak_phase(air, nu), 1e-9);
+    return SplitPhases(
+        Lanes(phases.low * (1.0 - air.low.peaked), phases.high * (1.0 - air.high.peaked)),
+        Lanes(phases.low * air.low.peaked * over, phases.high * air.high.peaked * over),
+    );
+}
+
+/// Light that the air scatters at altitude `h` into a direction of zenith cosine `mu` with the cosine `nu` to the sun, whose own
+/// zenith cosine is `sun_mu`. Without `all_orders` only light straight from the sun counts.
+///
+/// domain  h in [0, 1e5] m lin
+/// domain  mu in [-1, 1] 1 lin
+/// domain  sun_mu in [-1, 1] 1 lin
+/// domain  nu in [-1, 1] 1 lin
+/// domain  angular_radius in [0, 0.1] rad lin
+/// range   [0, 10] 1/m
+/// error   0.02 rel of reference::air_tables::air_source
+/// source  ours
+fn air_source(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, linear: sampler, air: Air, phases: SplitPhases, h: f32, mu: f32, sun_mu: f32, nu: f32, angular_radius: f32, all_orders: bool) -> AirSource {
+    let densities = air_densities(air, h);
+    var source = AirSource(vec3<f32>(0.0), vec3<f32>(0.0), air_extinction(air, densities));
+    let lit = sun_above_horizon(air.ground_radius, h, sun_mu, angular_radius);
+    if lit > 0.0 {
+        let sun = lit * exp(-sun_depth(columns, linear, air, h, sun_mu));
+        source.smooth_light = sun * air_scattering(air, densities, phases.smooth_lanes);
+        source.peaked_light = sun * air_scattering(air, densities, phases.peaked_lanes);
+    }
+    if all_orders {
+        let glow = diffuse_moments(moments, linear, air.top, h, sun_mu);
+        source.smooth_light += diffuse_source(air, densities, glow, mu, sun_mu, nu);
+    }
+    return source;
+}
+
+/// The light of a step of constant source per length and the optical depth `depth` before it: the integral of the transmittance over the step.
+///
+/// domain  depth in [0, 100] 1 lin
+/// domain  extinction in [1e-9, 0.1] 1/m log
+/// domain  distance in [1, 1e5] m log
+/// range   [0, 1e5] m
+/// error   1e-5 rel of reference::air_tables::step_length
+/// outside undefined
+/// source  Hillaire2015; series at small optical depth
+fn step_length(depth: vec3<f32>, extinction: vec3<f32>, distance: f32) -> vec3<f32> {
+    let x = extinction * distance;
+    let series = 1.0 - x * (0.5 - x * (0.16666667 - x * 0.041666667));
+    let exact = (1.0 - exp(-x)) / max(x, vec3<f32>(1e-6));
+    return exp(-depth) * select(exact, series, x < vec3<f32>(0.1)) * distance;
+}
+
+/// Light scattered into a ray and its optical depth, over its whole length. `panels` of eight points each are put on every stretch between
+/// the start, the lowest point, the edges of the planet's shadow and the end.
+///
+/// domain  panels in [1, 4] 1 lin
+/// domain  angular_radius in [0, 0.1] rad lin
+/// range   [0, 1e4] 1
+/// error   0.03 rel of reference::air_tables::scatter_along
+/// source  Nishita1993; Gauss-Legendre in squared distance: ours
+fn scatter_along(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, linear: sampler, air: Air, ray: AirRay, angular_radius: f32, all_orders: bool, panels: i32) -> Scattered {
+    let phases = split_phases(air, ray.nu);
+    let lowest = lowest_distance(air.ground_radius, ray);
+    // The inner edges of the stretches in order.
+    let dark_to = max(ray.dark_from, ray.dark_to);
+    let first = min(lowest, ray.dark_from);
+    let third = max(lowest, dark_to);
+    let second = clamp(lowest, ray.dark_from, dark_to);
+    let second_or = select(second, select(ray.dark_from, dark_to, lowest > dark_to), lowest < ray.dark_from || lowest > dark_to);
+    var result = Scattered(vec3<f32>(0.0), vec3<f32>(0.0), vec3<f32>(0.0));
+    var from_edge = 0.0;
+    for (var stretch = 0; stretch < 4; stretch++) {
+        var to_edge = ray.length;
+        if stretch == 0 {
+            to_edge = first;
+        } else if stretch == 1 {
+            to_edge = second_or;
+        } else if stretch == 2 {
+            to_edge = third;
+        }
+        let long = to_edge - from_edge;
+        if long > 0.0 {
+            let falling = to_edge <= lowest;
+            for (var i = 0; i < 8 * panels; i++) {
+                let node = gauss_eight(panels, select(i, 8 * panels - 1 - i, falling));
+                let share = node.x * node.x;
+                let t = select(from_edge + long * share, to_edge - long * share, falling);
+                let distance = long * (2.0 * node.x * node.y);
+                let h = max(ray_altitude(air.ground_radius, ray, t), 0.0);
+                let mu = clamp(((air.ground_radius + ray.altitude) * ray.mu + t) / (air.ground_radius + h), -1.0, 1.0);
+                let sun_mu = ray_sun_cosine(air.ground_radius, ray, h, t);
+                let source = air_source(columns, moments, linear, air, phases, h, mu, sun_mu, ray.nu, angular_radius, all_orders);
+                let weight = step_length(result.depth, source.extinction, distance);
+                result.smooth_light += source.smooth_light * weight;
+                result.peaked_light += source.peaked_light * weight;
+                result.depth += source.extinction * distance;
+            }
+        }
+        from_edge = max(from_edge, to_edge);
+    }
+    return result;
+}
+
+/// Radiance of scattered light for a cosine `nu` of the angle to the sun.
+///
+/// domain  scattered.smooth_light in [0, 100] 1 lin
+/// domain  scattered.peaked_light in [0, 100] 1 lin
+/// domain  scattered.depth in [0, 100] 1 lin
+/// domain  nu in [-1, 1] 1 lin
+/// range   [0, 1e8] 1/sr
+/// error   2e-4 rel of reference::air_tables::scattered_radiance
+/// source  elementary
+fn scattered_radiance(air: Air, scattered: Scattered, nu: f32) -> vec3<f32> {
+    return scattered.smooth_light + scattered.peaked_light * peak_phase(air, nu);
+}

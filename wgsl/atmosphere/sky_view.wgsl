@@ -1,0 +1,119 @@
+//! The table of the sky as seen from one eye: directions that leave the air, by height above the horizon and by azimuth from the sun.
+//! source   Hillaire2020 (a table per eye); half-angle tangents, exact horizon, cosine of the azimuth: ours
+//! symbols  mu zenith cosine · x, y coordinates in [0, 1]: azimuth from the sun, and height above the horizon
+//!
+//! A texel holds radiance for a sun of irradiance 1, times the scale of the eye: layer 0 but for peaked light [1/sr], layer 1 peaked light over the peaked
+//! phase function [1].
+#define_import_path veduta::atmosphere::sky_view
+
+#import veduta::atmosphere::ray::{tangent_altitude}
+#import veduta::atmosphere::medium::{Air, peak_phase}
+#import veduta::atmosphere::columns::{texture_place}
+
+/// What the tables of one eye belong to.
+struct SkyEye {
+    /// Unit vector to the sun, y up at the eye.
+    to_sun: vec3<f32>,
+    /// Altitude of the eye [m].
+    altitude: f32,
+    /// Tangent of half the zenith angle of the horizon.
+    horizon: f32,
+    /// Radius of the ground sphere [m].
+    ground_radius: f32,
+    /// Thickness of the air [m].
+    top: f32,
+    /// What radiance in the tables is multiplied with.
+    scale: f32,
+    /// Angular radius of the sun [rad].
+    sun_angular_radius: f32,
+}
+
+/// A direction's place in the tables of an eye.
+struct SkyPlace {
+    /// Azimuth from the sun: (1 - cos phi) / 2.
+    x: f32,
+    /// Height above, or depth below, the horizon: 0 at the horizon, 1 at zenith, nadir or the top of the air.
+    y: f32,
+    /// Whether the direction is below the horizon.
+    below: bool,
+    /// Cosine of the angle to the sun.
+    nu: f32,
+}
+
+/// Place of a unit vector `dir` in the tables of an eye.
+///
+/// domain  eye.to_sun in [-1, 1] 1 lin
+/// domain  eye.altitude in [0, 1e5] m lin
+/// domain  dir in [-1, 1] 1 lin
+/// range   [-1, 1] 1
+/// error   1e-3 abs of reference::air_tables::sky_place
+/// outside undefined
+/// source  ours
+fn sky_place(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
+    let nu = dot(dir, eye.to_sun);
+    let aside = dir.xz;
+    let both = dot(aside, aside) * dot(eye.to_sun.xz, eye.to_sun.xz);
+    let azimuth = clamp(dot(aside, eye.to_sun.xz) * inverseSqrt(max(both, 1e-20)), -1.0, 1.0);
+    let sine = length(aside);
+    if eye.altitude > eye.top && dir.y < 0.0 {
+        let lowest = tangent_altitude(eye.ground_radius, eye.altitude, dir);
+        let nadir = sine / (1.0 - dir.y) * eye.horizon;
+        let y = select(lowest / eye.top, 1.0 - nadir, lowest < 0.0);
+        return SkyPlace(0.5 - 0.5 * azimuth, sqrt(clamp(y, 0.0, 1.0)), lowest < 0.0, nu);
+    }
+    // Tangent of half the zenith angle over that of the horizon, or the same from the nadir.
+    let above = sine / max(1.0 + dir.y, 1e-20);
+    let below = above > eye.horizon;
+    let ratio = select(above / eye.horizon, eye.horizon / above, below);
+    return SkyPlace(0.5 - 0.5 * azimuth, sqrt(clamp(1.0 - ratio, 0.0, 1.0)), below, nu);
+}
+
+/// Direction of coordinates in the tables of an eye: the inverse of `sky_place`. The sun's azimuth is that of -z when it stands in the zenith.
+///
+/// domain  eye.to_sun in [-1, 1] 1 lin
+/// domain  eye.altitude in [0, 1e5] m lin
+/// domain  place in [0, 1] 1 lin
+/// range   [-1, 1] 1
+/// error   1e-3 abs of reference::air_tables::sky_direction
+/// outside undefined
+/// source  ours
+fn sky_direction(eye: SkyEye, place: vec2<f32>, below: bool) -> vec3<f32> {
+    // The horizon itself belongs to neither side: keep off it by more than rounding.
+    let y = max(place.y, 4e-3);
+    let ratio = 1.0 - y * y;
+    var sine = 0.0;
+    var mu = 0.0;
+    if eye.altitude > eye.top && !below {
+        let lowest = eye.top * y * y;
+        sine = (eye.ground_radius + lowest) / (eye.ground_radius + eye.altitude);
+        mu = -sqrt(max((eye.altitude - lowest) * (2.0 * eye.ground_radius + eye.altitude + lowest), 0.0)) / (eye.ground_radius + eye.altitude);
+    } else {
+        let half = select(eye.horizon * ratio, ratio / eye.horizon, below);
+        sine = 2.0 * half / (1.0 + half * half);
+        mu = (1.0 - half * half) / (1.0 + half * half);
+        mu = select(mu, -mu, below);
+    }
+    let azimuth = clamp(1.0 - 2.0 * place.x, -1.0, 1.0);
+    let across = sqrt(max(1.0 - azimuth * azimuth, 0.0));
+    let flat = length(eye.to_sun.xz);
+    let ahead = select(vec2<f32>(0.0, -1.0), eye.to_sun.xz / max(flat, 1e-20), flat > 1e-10);
+    let aside = ahead * azimuth + vec2<f32>(-ahead.y, ahead.x) * across;
+    return vec3<f32>(aside.x * sine, mu, aside.y * sine);
+}
+
+/// Radiance of the sky in a direction above the horizon, for a sun of irradiance 1 and without its disc, read from the table.
+///
+/// domain  place.x in [0, 1] 1 lin
+/// domain  place.y in [0, 1] 1 lin
+/// domain  place.nu in [-1, 1] 1 lin
+/// domain  eye.scale in [1, 1e6] 1 log
+/// range   [0, 1e6] 1/sr
+/// error   0.02 rel of reference::air_tables::sky_radiance
+/// source  Hillaire2020
+fn sky_radiance(sky: texture_2d_array<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace) -> vec3<f32> {
+    let size = vec2<f32>(textureDimensions(sky));
+    let at = texture_place(vec2<f32>(place.x, place.y), size);
+    let smooth_light = textureSampleLevel(sky, linear, at, 0, 0.0).rgb;
+    let peaked = textureSampleLevel(sky, linear, at, 1, 0.0).rgb;
+    return (smooth_light + peaked * peak_phase(air, place.nu)) / eye.scale;
+}

@@ -1,0 +1,44 @@
+The table of light scattered more than once, order by order: the first order out of the sun, the second out of the first, and the third, which
+adds all of them up and closes with a geometric series. Made anew only when the layers or the ground change.
+
+#PROGRAM{ air_diffuse }#
+
+#COMPUTE{
+    #CODE{
+#import veduta::atmosphere::medium::{Air}
+#import veduta::atmosphere::columns::{texel_coordinates}
+#import veduta::atmosphere::diffuse::{Moments, diffuse_place, encode_moments, decode_moments, add_moments}
+#import veduta::atmosphere::orders::{order_moments, further_orders}
+
+// 1, 2 or 3.
+override SCATTERING_ORDER: i32 = 1;
+
+@group(0) @binding(0) var<uniform> air: Air;
+@group(1) @binding(0) var linear: sampler;
+@group(1) @binding(1) var columns: texture_2d_array<f32>;
+// The order before, and the one before that.
+@group(1) @binding(2) var before: texture_2d_array<f32>;
+@group(1) @binding(3) var earlier: texture_2d_array<f32>;
+@group(2) @binding(0) var moments: texture_storage_2d_array<rgba16float, write>;
+
+fn order_at(order: texture_2d_array<f32>, texel: vec2<u32>) -> Moments {
+    return decode_moments(textureLoad(order, texel, 0, 0), textureLoad(order, texel, 1, 0));
+}
+
+@compute @workgroup_size(4, 4)
+fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
+    let size = textureDimensions(moments);
+    if id.x >= size.x || id.y >= size.y {
+        return;
+    }
+    let place = diffuse_place(air.top, texel_coordinates(vec2<f32>(id.xy), vec2<f32>(size)));
+    var found = order_moments(columns, before, linear, air, place.x, place.y, SCATTERING_ORDER == 1);
+    if SCATTERING_ORDER == 3 {
+        let second = order_at(before, id.xy);
+        found = add_moments(add_moments(order_at(earlier, id.xy), second), further_orders(second, found));
+    }
+    textureStore(moments, id.xy, 0, encode_moments(found));
+    textureStore(moments, id.xy, 1, found.more);
+}
+    }#
+}#

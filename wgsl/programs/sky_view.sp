@@ -1,0 +1,37 @@
+The table of the sky as one eye sees it: every direction that leaves the air. Made anew when the sun or the eye's altitude changes.
+
+#PROGRAM{ sky_view }#
+
+#COMPUTE{
+    #CODE{
+#import veduta::atmosphere::medium::{Air}
+#import veduta::atmosphere::ray::{air_ray}
+#import veduta::atmosphere::columns::{texel_coordinates}
+#import veduta::atmosphere::scatter::{scatter_along}
+#import veduta::atmosphere::sky_view::{SkyEye, sky_direction}
+
+override SKY_PANELS: i32 = 2;
+override ALL_ORDERS: i32 = 1;
+
+@group(0) @binding(0) var<uniform> air: Air;
+@group(0) @binding(1) var<uniform> eye: SkyEye;
+@group(1) @binding(0) var linear: sampler;
+@group(1) @binding(1) var columns: texture_2d_array<f32>;
+@group(1) @binding(2) var moments: texture_2d_array<f32>;
+@group(2) @binding(0) var sky: texture_storage_2d_array<rgba16float, write>;
+
+@compute @workgroup_size(8, 8)
+fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
+    let size = textureDimensions(sky);
+    if id.x >= size.x || id.y >= size.y {
+        return;
+    }
+    let place = texel_coordinates(vec2<f32>(id.xy), vec2<f32>(size));
+    let dir = sky_direction(eye, place, false);
+    var ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
+    let light = scatter_along(columns, moments, linear, air, ray, eye.sun_angular_radius, ALL_ORDERS != 0, SKY_PANELS);
+    textureStore(sky, id.xy, 0, vec4<f32>(light.smooth_light * eye.scale, 1.0));
+    textureStore(sky, id.xy, 1, vec4<f32>(light.peaked_light * eye.scale, 1.0));
+}
+    }#
+}#
