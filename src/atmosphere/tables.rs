@@ -17,8 +17,8 @@ pub struct SkyQuality {
     pub diffuse: [u32; 2],
     /// Sky: azimuth by height above the horizon, each in [2, 1024].
     pub sky: [u32; 2],
-    /// Groups of eight points on each stretch of a ray of the sky, in [1, 4].
-    pub sky_panels: u32,
+    /// Steps on each stretch of a ray of the sky, in [1, 64].
+    pub sky_steps: u32,
     /// Air before things: azimuth by height above and below the horizon; [2, 1024] and an even number in [4, 1024].
     pub aerial: [u32; 2],
     /// Distances of the air before things, in [2, 128].
@@ -37,7 +37,7 @@ impl SkyQuality {
             columns: [number("COLUMNS_WIDTH"), number("COLUMNS_HEIGHT")],
             diffuse: [number("DIFFUSE_WIDTH"), number("DIFFUSE_HEIGHT")],
             sky: [number("SKY_WIDTH"), number("SKY_HEIGHT")],
-            sky_panels: number("SKY_PANELS"),
+            sky_steps: number("SKY_STEPS"),
             aerial: [number("AERIAL_WIDTH"), number("AERIAL_HEIGHT")],
             aerial_slices: number("AERIAL_SLICES"),
             aerial_steps: number("AERIAL_STEPS"),
@@ -70,7 +70,7 @@ impl SkyQuality {
             within(name, size[1], 2, 1024)?;
         }
         within("aerial_slices", self.aerial_slices, 2, 128)?;
-        within("sky_panels", self.sky_panels, 1, 4)?;
+        within("sky_steps", self.sky_steps, 1, 64)?;
         within("aerial_steps", self.aerial_steps, 1, 8)?;
         if self.aerial[1] < 4 || self.aerial[1] % 2 == 1 {
             return Err(Error::OutOfDomain {
@@ -386,7 +386,7 @@ impl SkyTables {
             programs,
             "sky_view",
             &[
-                ("SKY_PANELS", f64::from(quality.sky_panels)),
+                ("SKY_STEPS", f64::from(quality.sky_steps)),
                 ("ALL_ORDERS", all),
             ],
         )?;

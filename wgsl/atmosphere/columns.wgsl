@@ -9,7 +9,7 @@
 
 #import veduta::atmosphere::medium::{Air, Lanes, air_densities, air_extinction}
 #import veduta::planet::shell::{altitude_along, top_distance}
-#import veduta::math::gauss::{gauss_eight}
+#import veduta::math::squared::{squared_node}
 
 /// Zenith cosine of the horizon of the ground sphere, seen from altitude `h`.
 ///
@@ -70,22 +70,22 @@ fn column_scale(air: Air, h: f32, mu: f32) -> Lanes {
     return scale;
 }
 
-/// Columns of all lanes [m] from altitude `h` along zenith cosine `mu` to the top of the air, by Gauss's quadrature with
-/// spacing that is dense at the lowest point; the ground does not end the path.
+/// Columns of all lanes [m] from altitude `h` along zenith cosine `mu` to the top of the air, by a quadrature
+/// that is dense at the lowest point; the ground does not end the path.
 ///
 /// domain  h in [0, 1e5] m lin
 /// domain  mu in [0, 1] 1 lin
 /// range   [0, 1e7] m
 /// error   1e-3 rel of reference::air_tables::columns_to_top
-/// source  Gauss-Legendre in squared distance: ours
+/// source  veduta::math::squared
 fn columns_to_top(air: Air, h: f32, mu: f32) -> Lanes {
     let end = top_distance(air.ground_radius, air.top, h, mu);
     let lowest = clamp(-(air.ground_radius + h) * mu, 0.0, end);
     var sum = Lanes(vec4<f32>(0.0), vec4<f32>(0.0));
-    for (var i = 0; i < 24; i++) {
-        let node = gauss_eight(3, i);
-        let share = node.x * node.x;
-        let weight = 2.0 * node.x * node.y;
+    for (var i = 0; i < 32; i++) {
+        let node = squared_node(32, i);
+        let share = node.x;
+        let weight = node.y;
         let beyond = air_densities(air, altitude_along(air.ground_radius, h, mu, lowest + (end - lowest) * share));
         sum.low += beyond.low * (weight * (end - lowest));
         sum.high += beyond.high * (weight * (end - lowest));

@@ -6,9 +6,10 @@
 #import veduta::atmosphere::medium::{Air, air_densities, air_extinction, air_scattering, air_phases}
 #import veduta::atmosphere::columns::{horizon_cosine, sun_depth, sun_above_horizon}
 #import veduta::atmosphere::diffuse::{Moments, diffuse_moments, diffuse_source, level_irradiance}
-#import veduta::atmosphere::scatter::{step_length}
+#import veduta::atmosphere::scatter::{step_share}
 #import veduta::planet::shell::{altitude_along, top_distance, ground_distance}
-#import veduta::math::gauss::{gauss_five, gauss_eight}
+#import veduta::math::gauss::{gauss_five}
+#import veduta::math::squared::{squared_node}
 
 /// Radiance that the ground reflects where the sun's zenith cosine is `sun_mu`: of light straight from the sun, or of the light whose moments are given.
 ///
@@ -57,12 +58,12 @@ fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
             let cos_phi = 0.8660254 * f32(1 - j);
             let nu = mu * sun_mu + sine * sun_sine * cos_phi;
             let phases = air_phases(air, nu);
-            var depth = vec3<f32>(0.0);
+            var left = vec3<f32>(1.0);
             var light = vec3<f32>(0.0);
             for (var k = 0; k < 8; k++) {
-                let node = gauss_eight(1, k);
-                let t = end * node.x * node.x;
-                let distance = end * 2.0 * node.x * node.y;
+                let node = squared_node(8, k);
+                let t = end * node.x;
+                let distance = end * node.y;
                 let altitude = max(altitude_along(air.ground_radius, h, mu, t), 0.0);
                 let there_mu = clamp((r * mu + t) / (air.ground_radius + altitude), -1.0, 1.0);
                 let there_sun = clamp((r * sun_mu + t * nu) / (air.ground_radius + altitude), -1.0, 1.0);
@@ -79,12 +80,14 @@ fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
                     let glow = diffuse_moments(moments, linear, air.top, altitude, there_sun);
                     source = diffuse_source(air, densities, glow, there_mu, there_sun, nu);
                 }
-                light += source * step_length(depth, extinction, distance);
-                depth += extinction * distance;
+                let depth = extinction * distance;
+                let passed = exp(-depth);
+                light += source * left * step_share(depth, passed) * distance;
+                left *= passed;
             }
             if below {
                 let there_sun = clamp((r * sun_mu + end * nu) / air.ground_radius, -1.0, 1.0);
-                light += exp(-depth) * ground_light(columns, moments, linear, air, there_sun, from_sun);
+                light += left * ground_light(columns, moments, linear, air, there_sun, from_sun);
             }
             let weighted = light * solid;
             let mean = dot(weighted, vec3<f32>(1.0 / 3.0));

@@ -7,7 +7,7 @@
 #import veduta::atmosphere::ray::{AirRay, ray_altitude, ray_sun_cosine, lowest_distance}
 #import veduta::atmosphere::columns::{sun_depth, sun_above_horizon}
 #import veduta::atmosphere::diffuse::{diffuse_moments, diffuse_source}
-#import veduta::math::gauss::{gauss_eight}
+#import veduta::math::squared::{squared_node}
 
 /// Light scattered into a ray.
 struct Scattered {
@@ -15,8 +15,8 @@ struct Scattered {
     smooth_light: vec3<f32>,
     /// Radiance of peaked light over the peaked phase function [1].
     peaked_light: vec3<f32>,
-    /// Optical depth.
-    depth: vec3<f32>,
+    /// What is left of the light behind.
+    transmittance: vec3<f32>,
 }
 
 /// Sources of light at a place of a ray.
@@ -79,31 +79,28 @@ fn air_source(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, li
     return source;
 }
 
-/// The light of a step of constant source per length and the optical depth `depth` before it: the integral of the transmittance over the step.
+/// Mean transmittance within a step of the optical depth `depth`, of which `left` = exp(-depth) is left at its end.
 ///
 /// domain  depth in [0, 100] 1 lin
-/// domain  extinction in [1e-9, 0.1] 1/m log
-/// domain  distance in [1, 1e5] m log
-/// range   [0, 1e5] m
-/// error   1e-5 rel of reference::air_tables::step_length
+/// domain  left in [0, 1] 1 lin
+/// range   [-1, 10] 1
+/// error   1e-5 rel of reference::air_tables::step_share
 /// outside undefined
 /// source  Hillaire2015; series at small optical depth
-fn step_length(depth: vec3<f32>, extinction: vec3<f32>, distance: f32) -> vec3<f32> {
-    let x = extinction * distance;
-    let series = 1.0 - x * (0.5 - x * (0.16666667 - x * 0.041666667));
-    let exact = (1.0 - exp(-x)) / max(x, vec3<f32>(1e-6));
-    return exp(-depth) * select(exact, series, x < vec3<f32>(0.1)) * distance;
+fn step_share(depth: vec3<f32>, left: vec3<f32>) -> vec3<f32> {
+    let series = 1.0 - depth * (0.5 - depth * (0.16666667 - depth * 0.041666667));
+    return select((1.0 - left) / max(depth, vec3<f32>(1e-6)), series, depth < vec3<f32>(0.1));
 }
 
-/// Light scattered into a ray and its optical depth, over its whole length. `panels` of eight points each are put on every stretch between
+/// Light scattered into a ray and its optical depth, over its whole length. `steps` are put on every stretch between
 /// the start, the lowest point, the edges of the planet's shadow and the end.
 ///
-/// domain  panels in [1, 4] 1 lin
+/// domain  steps in [1, 64] 1 lin
 /// domain  angular_radius in [0, 0.1] rad lin
 /// range   [0, 1e4] 1
 /// error   0.03 rel of reference::air_tables::scatter_along
-/// source  Nishita1993; Gauss-Legendre in squared distance: ours
-fn scatter_along(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, linear: sampler, air: Air, ray: AirRay, angular_radius: f32, all_orders: bool, panels: i32) -> Scattered {
+/// source  Nishita1993; veduta::math::squared
+fn scatter_along(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, linear: sampler, air: Air, ray: AirRay, angular_radius: f32, all_orders: bool, steps: i32) -> Scattered {
     let phases = split_phases(air, ray.nu);
     let lowest = lowest_distance(air.ground_radius, ray);
     // The inner edges of the stretches in order.
@@ -112,7 +109,7 @@ fn scatter_along(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
     let third = max(lowest, dark_to);
     let second = clamp(lowest, ray.dark_from, dark_to);
     let second_or = select(second, select(ray.dark_from, dark_to, lowest > dark_to), lowest < ray.dark_from || lowest > dark_to);
-    var result = Scattered(vec3<f32>(0.0), vec3<f32>(0.0), vec3<f32>(0.0));
+    var result = Scattered(vec3<f32>(0.0), vec3<f32>(0.0), vec3<f32>(1.0));
     var from_edge = 0.0;
     for (var stretch = 0; stretch < 4; stretch++) {
         var to_edge = ray.length;
@@ -126,19 +123,21 @@ fn scatter_along(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
         let long = to_edge - from_edge;
         if long > 0.0 {
             let falling = to_edge <= lowest;
-            for (var i = 0; i < 8 * panels; i++) {
-                let node = gauss_eight(panels, select(i, 8 * panels - 1 - i, falling));
-                let share = node.x * node.x;
+            for (var i = 0; i < steps; i++) {
+                let node = squared_node(steps, select(i, steps - 1 - i, falling));
+                let share = node.x;
                 let t = select(from_edge + long * share, to_edge - long * share, falling);
-                let distance = long * (2.0 * node.x * node.y);
+                let distance = long * node.y;
                 let h = max(ray_altitude(air.ground_radius, ray, t), 0.0);
                 let mu = clamp(((air.ground_radius + ray.altitude) * ray.mu + t) / (air.ground_radius + h), -1.0, 1.0);
                 let sun_mu = ray_sun_cosine(air.ground_radius, ray, h, t);
                 let source = air_source(columns, moments, linear, air, phases, h, mu, sun_mu, ray.nu, angular_radius, all_orders);
-                let weight = step_length(result.depth, source.extinction, distance);
+                let depth = source.extinction * distance;
+                let left = exp(-depth);
+                let weight = result.transmittance * step_share(depth, left) * distance;
                 result.smooth_light += source.smooth_light * weight;
                 result.peaked_light += source.peaked_light * weight;
-                result.depth += source.extinction * distance;
+                result.transmittance *= left;
             }
         }
         from_edge = max(from_edge, to_edge);
@@ -150,7 +149,7 @@ fn scatter_along(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
 ///
 /// domain  scattered.smooth_light in [0, 100] 1 lin
 /// domain  scattered.peaked_light in [0, 100] 1 lin
-/// domain  scattered.depth in [0, 100] 1 lin
+/// domain  scattered.transmittance in [0, 1] 1 lin
 /// domain  nu in [-1, 1] 1 lin
 /// range   [0, 1e8] 1/sr
 /// error   2e-4 rel of reference::air_tables::scattered_radiance

@@ -56,11 +56,9 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::atmosphere::sky_view::{SkyEye, sky_place, sky_radiance}
 #import veduta::atmosphere::aerial::{aerial_light}
 #import veduta::atmosphere::sun_disc::{sun_disc}
-#ifndef AERIAL_TARGETS
 #import veduta::tone_map::exponential::{exponential}
 #import veduta::post::srgb::{encode_srgb, decode_srgb}
 #import veduta::post::dither::{dither}
-#endif
     }#
     #USE{ VARYING }#
     #CODE{
@@ -119,6 +117,19 @@ fn before(ray_at: vec3<f32>, seen: f32) -> AirLight {
 }
 #endif
 
+// What is written for a radiance.
+fn shown(radiance: vec3<f32>, pixel: vec2<f32>) -> vec4<f32> {
+    if OUTPUT == 2 {
+        return vec4<f32>(radiance, 1.0);
+    }
+    let signal = dither(encode_srgb(exponential(radiance, draw_view.exposure)), vec2<u32>(pixel), 255.0);
+    if OUTPUT == 1 {
+        return vec4<f32>(decode_srgb(signal), 1.0);
+    }
+    return vec4<f32>(signal, 1.0);
+}
+
+#ifdef AERIAL
 #ifdef AERIAL_TARGETS
 struct Layers {
     @location(0) in_scatter: vec4<f32>,
@@ -138,28 +149,22 @@ fn draw(in: Corner) -> Layers {
 #else
 @fragment
 fn draw(in: Corner) -> @location(0) vec4<f32> {
-    let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
-#ifdef AERIAL
     let texel = vec2<i32>(in.position.xy);
     let seen = textureLoad(depth, texel, 0);
-    var radiance = vec3<f32>(0.0);
     if seen == draw_view.far_depth {
-        radiance = background(dir) * draw_view.sun_irradiance;
-    } else {
-        let front = before(in.ray, seen);
-        radiance = front.in_scatter * draw_view.sun_irradiance + front.transmittance * textureLoad(picture, texel, 0).rgb;
+        let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
+        return shown(background(dir) * draw_view.sun_irradiance, in.position.xy);
     }
-#else
-    let radiance = background(dir) * draw_view.sun_irradiance;
+    let front = before(in.ray, seen);
+    let radiance = front.in_scatter * draw_view.sun_irradiance + front.transmittance * textureLoad(picture, texel, 0).rgb;
+    return shown(radiance, in.position.xy);
+}
 #endif
-    if OUTPUT == 2 {
-        return vec4<f32>(radiance, 1.0);
-    }
-    let shown = dither(encode_srgb(exponential(radiance, draw_view.exposure)), vec2<u32>(in.position.xy), 255.0);
-    if OUTPUT == 1 {
-        return vec4<f32>(decode_srgb(shown), 1.0);
-    }
-    return vec4<f32>(shown, 1.0);
+#else
+@fragment
+fn draw(in: Corner) -> @location(0) vec4<f32> {
+    let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
+    return shown(background(dir) * draw_view.sun_irradiance, in.position.xy);
 }
 #endif
     }#

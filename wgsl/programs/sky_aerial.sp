@@ -8,7 +8,7 @@ invocation marches one direction from the eye to its end and leaves a texel at e
 #import veduta::atmosphere::medium::{Air}
 #import veduta::atmosphere::ray::{air_ray, ray_altitude, ray_sun_cosine}
 #import veduta::atmosphere::columns::{texel_coordinates}
-#import veduta::atmosphere::scatter::{split_phases, air_source, step_length}
+#import veduta::atmosphere::scatter::{split_phases, air_source, step_share}
 #import veduta::atmosphere::sky_view::{SkyEye, sky_direction}
 #import veduta::atmosphere::aerial::{aerial_distance}
 
@@ -39,6 +39,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     var smooth_light = vec3<f32>(0.0);
     var peaked_light = vec3<f32>(0.0);
     var depth = vec3<f32>(0.0);
+    var left = vec3<f32>(1.0);
     var t = 0.0;
     for (var slice = 0; slice < slices; slice++) {
         let end = aerial_distance(f32(slice) / f32(slices - 1), ray.length);
@@ -58,10 +59,13 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
                 mean_peaked = source.peaked_light;
                 mean_depth = source.extinction;
             } else {
-                let weight = step_length(depth, source.extinction, distance);
+                let passed = source.extinction * distance;
+                let share = exp(-passed);
+                let weight = left * step_share(passed, share) * distance;
                 smooth_light += source.smooth_light * weight;
                 peaked_light += source.peaked_light * weight;
-                depth += source.extinction * distance;
+                depth += passed;
+                left *= share;
             }
         }
         if slice > 0 {

@@ -10,7 +10,7 @@ The table of the sky as one eye sees it: every direction that leaves the air. Ma
 #import veduta::atmosphere::scatter::{scatter_along}
 #import veduta::atmosphere::sky_view::{SkyEye, sky_direction}
 
-override SKY_PANELS: i32 = 2;
+override SKY_STEPS: i32 = 16;
 override ALL_ORDERS: i32 = 1;
 
 @group(0) @binding(0) var<uniform> air: Air;
@@ -29,7 +29,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     let place = texel_coordinates(vec2<f32>(id.xy), vec2<f32>(size));
     let dir = sky_direction(eye, place, false);
     var ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
-    let light = scatter_along(columns, moments, linear, air, ray, eye.sun_angular_radius, ALL_ORDERS != 0, SKY_PANELS);
+    let light = scatter_along(columns, moments, linear, air, ray, eye.sun_angular_radius, ALL_ORDERS != 0, SKY_STEPS);
     textureStore(sky, id.xy, 0, vec4<f32>(light.smooth_light * eye.scale, 1.0));
     textureStore(sky, id.xy, 1, vec4<f32>(light.peaked_light * eye.scale, 1.0));
 }
