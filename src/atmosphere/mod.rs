@@ -4,11 +4,12 @@ mod check;
 mod file;
 mod medium;
 mod physics;
+pub mod probe;
 mod ray;
 
 pub use medium::{
     AIR_WORDS, Atmosphere, Lane, Layer, Lobe, MOST_LANES, Phase, Profile, Sun,
     cornette_shanks_asymmetry,
 };
-pub use ray::{AirRay, ProbeRay};
 pub use physics::{Aerosol, Molecules, aerosol_scattering, rayleigh_scattering};
+pub use ray::{AirRay, ProbeRay};
