@@ -4,9 +4,11 @@ mod check;
 mod file;
 mod medium;
 mod physics;
+mod probe;
 
 pub use medium::{
     AIR_WORDS, Atmosphere, Lane, Layer, Lobe, MOST_LANES, Phase, Profile, Sun,
     cornette_shanks_asymmetry,
 };
 pub use physics::{Aerosol, Molecules, aerosol_scattering, rayleigh_scattering};
+pub use probe::{Orders, ProbeLight, ProbePath, ProbeRay, probe};
