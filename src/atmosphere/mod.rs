@@ -12,4 +12,5 @@ pub use medium::{
     cornette_shanks_asymmetry,
 };
 pub use physics::{Aerosol, Molecules, aerosol_scattering, rayleigh_scattering};
-pub use ray::{AirRay, ProbeRay};
+pub use probe::{Orders, Probe, ProbeLight, ProbeOptions, ProbePath, ProbeRay, probe};
+pub use ray::AirRay;

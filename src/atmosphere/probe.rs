@@ -1,36 +1,91 @@
 //! Radiance and transmittance along given rays: a query, not a part of a frame.
 
+use super::check::{fault, within};
+use super::medium::Atmosphere;
+use super::ray::AirRay;
+use crate::device::Gpu;
 use crate::error::Error;
 use crate::program::{PipelineOptions, ProgramSet};
 
-use super::Atmosphere;
-use super::ray::AirRay;
-pub use super::ray::ProbeRay;
-
-/// How the light is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Path {
-    /// By marching along the ray and from every sample to the sun; with high counts a reference on the device.
-    #[default]
-    Textbook,
+/// A ray whose light is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProbeRay {
+    /// Altitude of the eye [m], at least 0.
+    pub altitude: f64,
+    /// Direction of the view, a unit vector in the frame of the eye, y up.
+    pub dir: [f64; 3],
+    /// Direction to the sun, a unit vector in the same frame.
+    pub to_sun: [f64; 3],
+    /// Where the ray ends [m], if not at the ground or the top of the air before; above 0, may be infinite.
+    pub distance: f64,
 }
 
-/// How often light may have been scattered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
+/// The light along a ray, for a point of a sun whose irradiance outside the air is 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProbeLight {
+    /// Radiance scattered into the ray [1/sr], without that of the ground at its end. 0 for a ray that misses the air.
+    pub in_scatter: [f32; 3],
+    /// Transmittance to the end of the ray. 1 for a ray that misses the air.
+    pub transmittance: [f32; 3],
+}
+
+/// Which light is counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Orders {
-    /// Once.
-    #[default]
+    /// What the air has scattered once.
     Single,
+    /// What the air has scattered once and more often, and what the ground has reflected before.
+    All,
+}
+
+/// How the device finds it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProbePath {
+    /// By marching.
+    Textbook,
+    /// By tables.
+    Fast,
+}
+
+impl ProbeRay {
+    /// The ray of a row of eight numbers: altitude, direction, direction to the sun, distance. The directions are made
+    /// unit vectors.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] naming the row, which `row` is the number of, for an altitude below 0 or not finite, a
+    /// direction whose length is not within 1e-3 of 1, and a distance that is not above 0.
+    pub fn from_row(row: usize, numbers: [f64; 8]) -> Result<ProbeRay, Error> {
+        let [altitude, dx, dy, dz, sx, sy, sz, distance] = numbers;
+        let name = |what: &str| format!("{what} of row {row}");
+        if !(altitude >= 0.0 && altitude.is_finite()) {
+            let domain = "finite and at least 0 m".to_owned();
+            return Err(fault(&name("the altitude"), altitude, domain));
+        }
+        let unit = |what: &str, v: [f64; 3]| {
+            let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let what = name(&format!("the length of the {what}"));
+            within(&what, length, (0.999, 1.001, "1"))?;
+            Ok(v.map(|x| x / length))
+        };
+        if distance.is_nan() || distance <= 0.0 {
+            let domain = "above 0 m, or infinite".to_owned();
+            return Err(fault(&name("the distance"), distance, domain));
+        }
+        Ok(ProbeRay {
+            altitude,
+            dir: unit("direction", [dx, dy, dz])?,
+            to_sun: unit("direction to the sun", [sx, sy, sz])?,
+            distance,
+        })
+    }
 }
 
 /// Choices that are made once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ProbeOptions {
-    /// How the light is found.
-    pub path: Path,
-    /// How often it may have been scattered.
+    /// How the light is found; only by marching as yet.
+    pub path: ProbePath,
+    /// Which light is counted; only what is scattered once as yet.
     pub orders: Orders,
     /// Steps along each stretch of a ray, at least 1; a step has two samples.
     pub steps: u32,
@@ -43,22 +98,12 @@ impl Default for ProbeOptions {
     /// Converged to about 1e-5 in the air of the Earth.
     fn default() -> Self {
         ProbeOptions {
-            path: Path::Textbook,
+            path: ProbePath::Textbook,
             orders: Orders::Single,
             steps: 96,
             light_steps: 24,
         }
     }
-}
-
-/// Light along a ray, in red, green and blue.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ProbeResult {
-    /// Radiance scattered into the ray under a point sun of irradiance 1; exactly 0 for a ray that misses the air [1/sr].
-    pub in_scatter: [f32; 3],
-    /// Transmittance to the end of the ray: the ground, the top of the air or the ray's distance; exactly 1 for a ray that
-    /// misses the air.
-    pub transmittance: [f32; 3],
 }
 
 /// Finds the light along rays through one air.
@@ -136,7 +181,7 @@ impl Probe {
     /// Builds the pipeline and uploads the air.
     ///
     /// # Errors
-    /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for counts; the faults of [`ProgramSet::get`] and of making the
+    /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for counts; [`Error::NotYet`]; the faults of [`ProgramSet::get`] and of making the
     /// pipeline.
     pub fn new(
         device: &wgpu::Device,
@@ -145,6 +190,14 @@ impl Probe {
         options: &ProbeOptions,
     ) -> Result<Probe, Error> {
         let bytes = atmosphere.air_bytes()?;
+        if options.path != ProbePath::Textbook {
+            return Err(Error::NotYet("the path `fast` of probes".to_owned()));
+        }
+        if options.orders != Orders::Single {
+            return Err(Error::NotYet(
+                "light of more than one order on the path `textbook`".to_owned(),
+            ));
+        }
         let (steps, light_steps) = (u64::from(options.steps), u64::from(options.light_steps));
         for (name, count) in [("steps", steps), ("light_steps", light_steps)] {
             if !(1..=4096).contains(&count) {
@@ -207,7 +260,7 @@ impl Probe {
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         rays: &[ProbeRay],
-    ) -> Result<Vec<ProbeResult>, Error> {
+    ) -> Result<Vec<ProbeLight>, Error> {
         let mut bytes = Vec::with_capacity(rays.len() * AirRay::SIZE);
         for (at, ray) in rays.iter().enumerate() {
             let ray = checked(ray, at)?;
@@ -225,7 +278,7 @@ impl Probe {
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         rays: &[u8],
-        results: &mut Vec<ProbeResult>,
+        results: &mut Vec<ProbeLight>,
     ) -> Result<(), Error> {
         let count = rays.len() / AirRay::SIZE;
         let size = (count * RESULT) as u64;
@@ -307,11 +360,37 @@ impl Probe {
                     f32::from_le_bytes([b[0], b[1], b[2], b[3]])
                 })
             };
-            ProbeResult {
+            ProbeLight {
                 in_scatter: three(0),
                 transmittance: three(16),
             }
         }));
         Ok(())
     }
+}
+
+/// The light along rays, on the device, with the counts of [`ProbeOptions::default`]. For more than one batch of rays keep a
+/// [`Probe`].
+///
+/// # Errors
+/// As [`Probe::new`] and [`Probe::run`].
+pub fn probe(
+    gpu: &Gpu,
+    atmosphere: &Atmosphere,
+    rays: &[ProbeRay],
+    path: ProbePath,
+    orders: Orders,
+) -> Result<Vec<ProbeLight>, Error> {
+    let options = ProbeOptions {
+        path,
+        orders,
+        ..Default::default()
+    };
+    Probe::new(
+        &gpu.device,
+        crate::programs::programs(),
+        atmosphere,
+        &options,
+    )?
+    .run(&gpu.device, &gpu.queue, rays)
 }

@@ -104,7 +104,8 @@ fn air_densities(air: Air, h: f32) -> Lanes {
 
 /// Extinction of amounts (densities), or optical depth of columns [m], per channel.
 ///
-/// domain  amounts in [0, 1] 1 lin
+/// domain  amounts.low in [0, 1] 1 lin
+/// domain  amounts.high in [0, 1] 1 lin
 /// range   [0, 1] 1/m
 /// error   4e-7 rel of reference::medium::air_extinction
 /// source  sum over the layers
@@ -126,10 +127,13 @@ fn air_extinction(air: Air, amounts: Lanes) -> vec3<f32> {
 
 /// Scattering of amounts, each lane weighted (with its phase function, say), per channel.
 ///
-/// domain  amounts in [0, 1] 1 lin
-/// domain  weights in [0, 10] 1/sr lin
+/// domain  amounts.low in [0, 1] 1 lin
+/// domain  amounts.high in [0, 1] 1 lin
+/// domain  weights.low in [0, 10] 1/sr lin
+/// domain  weights.high in [0, 10] 1/sr lin
 /// range   [0, 10] 1/m
 /// error   6e-7 rel of reference::medium::air_scattering
+/// outside undefined
 /// source  sum over the layers
 fn air_scattering(air: Air, amounts: Lanes, weights: Lanes) -> vec3<f32> {
     let low = amounts.low * weights.low;
@@ -163,6 +167,7 @@ fn four_phases(layers: FourLayers, nu: f32) -> vec4<f32> {
 /// domain  nu in [-1, 1] 1 lin
 /// range   [0, 1e6] 1/sr
 /// error   2e-4 rel of reference::medium::air_phases
+/// outside undefined
 /// source  Cornette1992, Henyey1941, Draine2003 in one form
 fn air_phases(air: Air, nu: f32) -> Lanes {
     var phases = Lanes(four_phases(air.low, nu), vec4<f32>(0.0));
@@ -177,6 +182,7 @@ fn air_phases(air: Air, nu: f32) -> Lanes {
 /// domain  nu in [-1, 1] 1 lin
 /// range   [0, 1e6] 1/sr
 /// error   2e-4 rel of reference::medium::peak_phase
+/// outside undefined
 /// source  as air_phases
 fn peak_phase(air: Air, nu: f32) -> f32 {
     let gap = 1.0 - air.peak_g;
