@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands;
 
-/// Outdoor landscapes for wgpu: render, compose, lint, list, bench, cost, stress, diff, eval.
+/// Outdoor landscapes for wgpu: render, compose, lint, list, bench, cost, stress, diff, eval, probe.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "veduta", version, about, arg_required_else_help = true)]
 pub struct Args {
@@ -35,6 +35,8 @@ pub enum Command {
     Diff(commands::diff::DiffArgs),
     /// Evaluate a WGSL expression over rows of numbers on the device
     Eval(commands::eval::EvalArgs),
+    /// Find the light along given rays
+    Probe(commands::probe::ProbeArgs),
 }
 
 impl Args {
@@ -53,6 +55,7 @@ impl Args {
             Command::Stress(args) => commands::stress::run(args),
             Command::Diff(args) => commands::diff::run(args),
             Command::Eval(args) => commands::eval::run(args),
+            Command::Probe(args) => commands::probe::run(args),
         }
     }
 }

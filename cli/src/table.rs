@@ -259,6 +259,33 @@ impl Table {
     }
 }
 
+impl Table {
+    /// The numbers in `f64`, row after row; infinities and NaN pass.
+    ///
+    /// # Errors
+    /// [`CliError::Cell`] for text that is no number.
+    pub fn to_numbers(&self, path: &Path) -> Result<Vec<f64>, CliError> {
+        match &self.cells {
+            Cells::F32(v) => Ok(v.iter().map(|x| f64::from(*x)).collect()),
+            Cells::F64(v) => Ok(v.clone()),
+            Cells::I64(v) => Ok(v.iter().map(|x| *x as f64).collect()),
+            Cells::Text(v) => v
+                .iter()
+                .enumerate()
+                .map(|(index, text)| {
+                    text.parse().map_err(|_| CliError::Cell {
+                        path: path.to_owned(),
+                        row: index / self.columns,
+                        column: index % self.columns,
+                        value: format!("`{text}`"),
+                        needed: "a number is needed".to_owned(),
+                    })
+                })
+                .collect(),
+        }
+    }
+}
+
 type Misfit = (String, &'static str);
 
 fn whole_number_needed(ty: Column) -> &'static str {

@@ -1,18 +1,20 @@
 //! The air of a planet: what it is made of, the sky that it makes, and the air before a host's own scene.
 
 mod check;
+mod fast;
 mod file;
 mod medium;
-mod fast;
 mod physics;
-mod tables;
+pub mod probe;
 pub mod ray;
+mod tables;
 
+pub use fast::{FastProbe, RayLight};
 pub use medium::{
     AIR_WORDS, Atmosphere, Lane, Layer, Lobe, MOST_LANES, Phase, Profile, Sun,
     cornette_shanks_asymmetry,
 };
-pub use ray::{AirRay, ProbeRay};
-pub use fast::{FastProbe, RayLight};
-pub use tables::{Eye, SkyQuality, SkyTables};
 pub use physics::{Aerosol, Molecules, aerosol_scattering, rayleigh_scattering};
+pub use probe::{Orders, Probe, ProbeLight, ProbeOptions, ProbePath, ProbeRay, probe};
+pub use ray::AirRay;
+pub use tables::{Eye, SkyQuality, SkyTables};

@@ -1,5 +1,7 @@
 //! Rays inside the air, made in `f64`.
 
+use super::probe::ProbeRay;
+
 /// A ray inside the air, as `veduta::atmosphere::ray::AirRay` has it. It starts at the eye, or where it enters when the eye
 /// is above the air.
 ///
@@ -28,19 +30,6 @@ pub struct AirRay {
     pub dark_to: f32,
     /// 1 when the ray ends on the ground, else 0.
     pub meets_ground: u32,
-}
-
-/// A ray as a caller has it, in the local frame of the eye: y up.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ProbeRay {
-    /// Altitude of the eye [m]; may be far above the air.
-    pub altitude: f64,
-    /// Unit vector of the view.
-    pub dir: [f64; 3],
-    /// Unit vector to the sun.
-    pub to_sun: [f64; 3],
-    /// Distance from the eye at which the ray ends, if not at the ground or the top of the air before; may be infinite [m].
-    pub distance: f64,
 }
 
 /// The share of a ray that a place inside the air sees; all in `f64`.

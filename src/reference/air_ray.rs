@@ -144,8 +144,7 @@ fn trace(
     }
     let meets = ground.is_some() && end <= max_distance;
     let end = end.min(max_distance).max(0.0);
-    let [dark_from, dark_to] =
-        shadow(place, dir, to_sun, ground_radius, end).unwrap_or([end, end]);
+    let [dark_from, dark_to] = shadow(place, dir, to_sun, ground_radius, end).unwrap_or([end, end]);
     AirRay {
         altitude,
         mu,

@@ -44,6 +44,43 @@ impl Default for Atmosphere {
     }
 }
 
+impl From<Atmosphere> for crate::Atmosphere {
+    /// The same air as layers, over black ground.
+    fn from(air: Atmosphere) -> Self {
+        use crate::atmosphere::{Layer, Phase, Profile};
+        let layer = |name: &str, scale_height, scattering, absorption, phase| Layer {
+            name: name.to_owned(),
+            profile: Profile::Exponential { scale_height },
+            scattering,
+            absorption,
+            phase,
+        };
+        let absorption = (air.mie_extinction - air.mie_scattering).max(0.0);
+        Self {
+            planet_radius: air.ground_radius,
+            thickness: air.top,
+            ground_albedo: [0.0; 3],
+            sun: Default::default(),
+            layers: vec![
+                layer(
+                    "molecules",
+                    air.rayleigh_height,
+                    air.rayleigh_scattering,
+                    [0.0; 3],
+                    Phase::Rayleigh,
+                ),
+                layer(
+                    "haze",
+                    air.mie_height,
+                    [air.mie_scattering; 3],
+                    [absorption; 3],
+                    Phase::CornetteShanks { g: air.mie_g },
+                ),
+            ],
+        }
+    }
+}
+
 /// Light added and light left along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkyLight {

@@ -1,7 +1,7 @@
 //! The f64 twins of the module functions, written from the formulas, and the references that they are judged by.
 //!
-//! References, each with an error: [`quadrature`], [`sky`] (scattered once), [`sky_paths`] (all orders), [`volume`] (both,
-//! in any medium), [`intersect`].
+//! References, each with an error: [`quadrature`], [`sky`] (scattered once), [`sky_paths`] (all orders), [`probe`] (both),
+//! [`volume`] (both, in any medium), [`intersect`].
 //! What they stand on: [`monte_carlo`], [`parallel`].
 
 pub mod air_ray;
@@ -18,9 +18,11 @@ pub mod parallel;
 pub mod phase;
 pub mod planet;
 pub mod post;
+pub mod probe;
 pub mod quadrature;
 pub mod sky;
 pub mod sky_paths;
 pub mod terrain;
+pub mod textbook;
 pub mod tone_map;
 pub mod volume;

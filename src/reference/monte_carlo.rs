@@ -1,6 +1,7 @@
 //! What the random estimators share: streams of random numbers, sampled directions, and honest statistics.
 
 use super::math::{add, dot, normalize, scale};
+use crate::atmosphere::Lobe;
 use std::f64::consts::{PI, TAU};
 
 /// 2^64 over the golden ratio, odd.
@@ -99,6 +100,20 @@ pub fn sample_cornette_shanks(g: f64, random: &mut Random) -> f64 {
     loop {
         let mu = sample_henyey_greenstein(g, random);
         if random.unit() < 0.5 * (1.0 + mu * mu) {
+            return mu;
+        }
+    }
+}
+
+/// Cosine of a scattering angle with the density of a lobe of Draine's form, |g| < 1.
+pub fn sample_lobe(lobe: &Lobe, random: &mut Random) -> f64 {
+    let Lobe { g, alpha, .. } = *lobe;
+    if g == 0.0 && alpha == 1.0 {
+        return sample_rayleigh(random);
+    }
+    loop {
+        let mu = sample_henyey_greenstein(g, random);
+        if alpha == 0.0 || random.unit() * (1.0 + alpha) < 1.0 + alpha * mu * mu {
             return mu;
         }
     }

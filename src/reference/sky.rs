@@ -1,46 +1,50 @@
-//! Sky radiance scattered once, by quadrature with an error estimate, with ozone and the planet's shadow.
+//! Sky radiance scattered once, by quadrature with an error estimate, in any air and with the planet's shadow.
 //!
 //! Lengths in metres, coefficients in 1/m. The eye stands on the y axis at an altitude >= 0, at most about 1e8; directions
 //! are unit vectors with y up at the eye. Radiance is relative to the sun's irradiance outside the air.
 
-use super::atmosphere::Atmosphere;
 use super::math::{add, dot, scale};
 use super::monte_carlo::lambert;
-use super::phase::{phase_cornette_shanks, phase_rayleigh};
 use super::quadrature::{Rule, Tolerance, integrate_kronrod};
+use crate::atmosphere::{Atmosphere, Lane, Lobe, MOST_LANES, Profile};
+use crate::error::Error;
 use std::sync::OnceLock;
 
-/// A layer of ozone, which absorbs and does not scatter. Its density falls linearly from 1 at the centre to 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ozone {
-    /// Absorption at the centre.
-    pub absorption: [f64; 3],
-    /// Altitude of the centre.
-    pub centre: f64,
-    /// Distance from the centre to either end of the layer.
-    pub half_width: f64,
-}
+/// A number for each profile of a [`Sky`], in the order in which the layers name them first; what is beyond is 0.
+pub type Amounts = [f64; MOST_LANES];
 
-impl Default for Ozone {
-    /// The Earth's layer as Hillaire 2020 has it.
-    fn default() -> Self {
-        Self {
-            absorption: [0.650e-6, 1.881e-6, 0.085e-6],
-            centre: 25_000.0,
-            half_width: 15_000.0,
-        }
-    }
-}
-
-/// The air, its ozone and the ground below.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// The air and the ground below, with what the integrals need at hand.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sky {
-    /// Planet, air and aerosol.
-    pub air: Atmosphere,
-    /// The ozone layer, if there is one.
-    pub ozone: Option<Ozone>,
-    /// Share of light that the Lambertian ground reflects, 0 to 1 in every channel.
-    pub ground_albedo: [f64; 3],
+    atmosphere: Atmosphere,
+    /// The different profiles of all layers.
+    pub(super) profiles: Vec<Profile>,
+    /// The exponential ones: which, and the reciprocal of the scale height.
+    exponentials: Vec<(usize, f64)>,
+    /// Extinction of each profile's layers together, at density 1.
+    pub(super) extinctions: Vec<[f64; 3]>,
+    /// What scatters.
+    pub(super) scatterers: Vec<Scatterer>,
+    /// Radii at which densities bend, above the ground.
+    bends: Vec<f64>,
+}
+
+/// A lobe of a layer that scatters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scatterer {
+    /// Which profile.
+    pub profile: usize,
+    /// Scattering at density 1.
+    pub scattering: [f64; 3],
+    /// Where it goes.
+    pub lobe: Lobe,
+}
+
+impl Default for Sky {
+    /// That of the default atmosphere.
+    fn default() -> Self {
+        Sky::of_valid(&Atmosphere::default())
+    }
 }
 
 /// A view ray from the eye.
@@ -120,38 +124,103 @@ fn roots(a: f64, b: f64, c: f64) -> [Option<f64>; 2] {
 }
 
 impl Sky {
+    /// The sky of an atmosphere; its sun is not used, because radiance is relative to it.
+    ///
+    /// # Errors
+    /// As [`Atmosphere::check`].
+    pub fn new(atmosphere: &Atmosphere) -> Result<Sky, Error> {
+        atmosphere.check()?;
+        Ok(Sky::of_valid(atmosphere))
+    }
+
+    fn of_valid(atmosphere: &Atmosphere) -> Sky {
+        let mut sky = Sky {
+            atmosphere: atmosphere.clone(),
+            profiles: Vec::new(),
+            exponentials: Vec::new(),
+            extinctions: Vec::new(),
+            scatterers: Vec::new(),
+            bends: Vec::new(),
+        };
+        for Lane {
+            profile,
+            extinction,
+            scattering,
+            lobe,
+        } in atmosphere.lanes()
+        {
+            let known = sky.profiles.iter().position(|p| *p == profile);
+            let k = known.unwrap_or_else(|| {
+                sky.profiles.push(profile);
+                sky.extinctions.push([0.0; 3]);
+                sky.profiles.len() - 1
+            });
+            for (sum, more) in sky.extinctions[k].iter_mut().zip(extinction) {
+                *sum += more;
+            }
+            if let Some(lobe) = lobe {
+                sky.scatterers.push(Scatterer {
+                    profile: k,
+                    scattering,
+                    lobe,
+                });
+            }
+        }
+        for (k, profile) in sky.profiles.iter().enumerate() {
+            if let Profile::Exponential { scale_height } = profile {
+                sky.exponentials.push((k, scale_height.recip()));
+            }
+            let inside = profile.bends().into_iter();
+            sky.bends.extend(
+                inside
+                    .filter(|h| *h > 0.0 && *h < atmosphere.thickness)
+                    .map(|h| atmosphere.planet_radius + h),
+            );
+        }
+        sky.bends.sort_by(f64::total_cmp);
+        sky.bends.dedup();
+        sky
+    }
+
+    /// What the air is.
+    pub fn atmosphere(&self) -> &Atmosphere {
+        &self.atmosphere
+    }
+
+    /// Radius of the ground.
+    pub(super) fn ground(&self) -> f64 {
+        self.atmosphere.planet_radius
+    }
+
     /// Radius of the top of the air.
     pub(super) fn top_radius(&self) -> f64 {
-        self.air.ground_radius + self.air.top
+        self.atmosphere.planet_radius + self.atmosphere.thickness
     }
 
-    /// Densities of air, aerosol and ozone relative to their greatest, at an altitude; below the ground those at it.
-    pub fn densities(&self, h: f64) -> [f64; 3] {
-        let h = h.max(0.0);
-        let ozone = self.ozone.map_or(0.0, |ozone| {
-            (1.0 - (h - ozone.centre).abs() / ozone.half_width).max(0.0)
-        });
-        [
-            (-h / self.air.rayleigh_height).exp(),
-            (-h / self.air.mie_height).exp(),
-            ozone,
-        ]
+    /// Densities relative to their greatest, at an altitude; below the ground those at it.
+    pub fn densities(&self, h: f64) -> Amounts {
+        let mut densities = [0.0; MOST_LANES];
+        for (density, profile) in densities.iter_mut().zip(&self.profiles) {
+            *density = profile.density(h);
+        }
+        densities
     }
 
-    /// Extinction of three densities, or optical depth of three columns.
-    pub fn extinction(&self, amount: [f64; 3]) -> [f64; 3] {
-        let absorption = self.ozone.map_or([0.0; 3], |ozone| ozone.absorption);
-        std::array::from_fn(|k| {
-            self.air.rayleigh_scattering[k] * amount[0]
-                + self.air.mie_extinction * amount[1]
-                + absorption[k] * amount[2]
-        })
+    /// Extinction of densities, or optical depth of columns.
+    pub fn extinction(&self, amounts: Amounts) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for (amount, extinction) in amounts.iter().zip(&self.extinctions) {
+            for (sum, extinction) in sum.iter_mut().zip(extinction) {
+                *sum += extinction * amount;
+            }
+        }
+        sum
     }
 
-    /// Density integrals (m) of air, aerosol and ozone over `distance` of a ray that starts at the altitude `h` with the
-    /// zenith cosine `mu` and stays above the ground. Within 1e-11 relative for the air and 1e-5 m for the ozone.
-    pub fn columns(&self, h: f64, mu: f64, distance: f64) -> [f64; 3] {
-        let r = self.air.ground_radius + h;
+    /// Density integrals (m) over `distance` of a ray that starts at the altitude `h` with the zenith cosine `mu` and stays
+    /// above the ground. Within 1e-11 relative for exponential layers, 1e-5 m for others.
+    pub fn columns(&self, h: f64, mu: f64, distance: f64) -> Amounts {
+        let r = self.ground() + h;
         self.chord_columns(Chord {
             closest: r * ((1.0 - mu) * (1.0 + mu)).max(0.0).sqrt(),
             from: r * mu,
@@ -160,7 +229,7 @@ impl Sky {
     }
 
     /// Density integrals of a chord: outwards from its lowest point on both sides.
-    pub(super) fn chord_columns(&self, chord: Chord) -> [f64; 3] {
+    pub(super) fn chord_columns(&self, chord: Chord) -> Amounts {
         let Chord { closest, from, to } = chord;
         if from < 0.0 && to > 0.0 {
             let (left, right) = (
@@ -172,40 +241,54 @@ impl Sky {
         self.outward(closest, from.abs().min(to.abs()), from.abs().max(to.abs()))
     }
 
-    /// Density integrals along a line that rises: panels whose altitude gains grow by three, 16 points each, and the ozone
-    /// in closed form.
-    fn outward(&self, closest: f64, from: f64, to: f64) -> [f64; 3] {
-        let start = closest.hypot(from);
-        let ground = self.air.ground_radius;
-        let mut sum = [0.0; 2];
-        let mut gain = 8.0 * self.air.mie_height.min(self.air.rayleigh_height);
-        let mut a = from;
-        while a < to {
-            let b = (from * from + gain * (2.0 * start + gain)).sqrt().min(to);
-            let part = inner_rule().integrate(
-                |t| {
+    /// Density integrals along a line that rises: panels whose altitude gains grow by three, 16 points each, and layers
+    /// that are not exponential in closed form.
+    fn outward(&self, closest: f64, from: f64, to: f64) -> Amounts {
+        let mut sums = [0.0; MOST_LANES];
+        let steepest = self.exponentials.iter().map(|e| e.1).fold(0.0, f64::max);
+        if steepest > 0.0 {
+            let (start, ground) = (closest.hypot(from), self.ground());
+            let mut gain = 8.0 / steepest;
+            let mut a = from;
+            while a < to {
+                let b = (from * from + gain * (2.0 * start + gain)).sqrt().min(to);
+                let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+                for &(x, weight) in &inner_rule().points {
+                    let t = middle + half * x;
                     let h = ((closest * closest + t * t).sqrt() - ground).max(0.0);
-                    [
-                        (-h / self.air.rayleigh_height).exp(),
-                        (-h / self.air.mie_height).exp(),
-                    ]
-                },
-                a,
-                b,
-            );
-            sum = [sum[0] + part[0], sum[1] + part[1]];
-            a = b;
-            gain *= 3.0;
+                    for &(k, fall) in &self.exponentials {
+                        sums[k] += weight * half * (-h * fall).exp();
+                    }
+                }
+                a = b;
+                gain *= 3.0;
+            }
         }
-        [sum[0], sum[1], self.ozone_outward(closest, from, to)]
+        if self.exponentials.len() < self.profiles.len() {
+            for (sum, profile) in sums.iter_mut().zip(&self.profiles) {
+                match *profile {
+                    Profile::Exponential { .. } => {}
+                    Profile::Tent { bottom, peak, top } => {
+                        *sum = self.tent_outward([bottom, peak, top], closest, from, to);
+                    }
+                    Profile::Constant { bottom, top } => {
+                        let [a, b] = [bottom, top].map(|h| self.crossing(h, closest, from, to));
+                        *sum = b - a;
+                    }
+                }
+            }
+        }
+        sums
     }
 
-    /// Integral of the ozone's density along a line that rises.
-    fn ozone_outward(&self, closest: f64, from: f64, to: f64) -> f64 {
-        let Some(ozone) = self.ozone else {
-            return 0.0;
-        };
-        let centre = self.air.ground_radius + ozone.centre;
+    /// Where a line that rises crosses an altitude; the nearer end where it does not.
+    fn crossing(&self, h: f64, closest: f64, from: f64, to: f64) -> f64 {
+        let half = half_chord(self.ground() + h, closest).unwrap_or(0.0);
+        half.max(from).min(to)
+    }
+
+    /// Integral of a tent's density along a line that rises.
+    fn tent_outward(&self, levels: [f64; 3], closest: f64, from: f64, to: f64) -> f64 {
         // Integral of the distance from the planet's centre over a part of the line.
         let turned = |a: f64, b: f64| {
             let (ra, rb) = (closest.hypot(a), closest.hypot(b));
@@ -218,34 +301,36 @@ impl Sky {
             };
             0.5 * (b * rb - a * ra + round)
         };
-        let crossing = |radius: f64| half_chord(radius, closest).unwrap_or(0.0);
-        let edges = [-ozone.half_width, 0.0, ozone.half_width]
-            .map(|offset| crossing(centre + offset).clamp(from, to));
-        let (lower, upper) = (edges[1] - edges[0], edges[2] - edges[1]);
-        let below = turned(edges[0], edges[1]) - centre * lower;
-        let above = turned(edges[1], edges[2]) - centre * upper;
-        (lower + upper + (below - above) / ozone.half_width).max(0.0)
+        let edges = levels.map(|h| self.crossing(h, closest, from, to));
+        let [bottom, peak, top] = levels;
+        let mut sum = 0.0;
+        if edges[1] > edges[0] {
+            let below = turned(edges[0], edges[1]);
+            sum += (below - (self.ground() + bottom) * (edges[1] - edges[0])) / (peak - bottom);
+        }
+        if edges[2] > edges[1] {
+            let above = turned(edges[1], edges[2]);
+            sum += ((self.ground() + top) * (edges[2] - edges[1]) - above) / (top - peak);
+        }
+        sum.max(0.0)
     }
 
     /// The same integrals as [`Sky::columns`] by another way: adaptive Gauss-Kronrod along the ray to a relative 1e-11.
-    pub fn columns_adaptive(&self, h: f64, mu: f64, distance: f64) -> [f64; 3] {
-        let r = self.air.ground_radius + h;
+    pub fn columns_adaptive(&self, h: f64, mu: f64, distance: f64) -> Amounts {
+        let r = self.ground() + h;
         let lowest = -r * mu;
         let mut edges = vec![0.0, distance, lowest];
-        if let Some(ozone) = self.ozone {
-            for offset in [-ozone.half_width, 0.0, ozone.half_width] {
-                let level = self.air.ground_radius + ozone.centre + offset;
-                let square = lowest * lowest - r * r + level * level;
-                edges.extend([lowest - square.abs().sqrt(), lowest + square.abs().sqrt()]);
-            }
+        for level in &self.bends {
+            let square = lowest * lowest - r * r + level * level;
+            edges.extend([lowest - square.abs().sqrt(), lowest + square.abs().sqrt()]);
         }
         edges.retain(|t| (0.0..=distance).contains(t));
         edges.sort_by(f64::total_cmp);
         let intervals: Vec<_> = edges.windows(2).map(|e| (e[0], e[1])).collect();
         let density = |t: f64| {
             // Altitude from the difference of squares, so that a small one keeps its digits.
-            let square = h * (2.0 * self.air.ground_radius + h) + t * (t + 2.0 * r * mu);
-            let ground = self.air.ground_radius;
+            let square = h * (2.0 * self.ground() + h) + t * (t + 2.0 * r * mu);
+            let ground = self.ground();
             self.densities(square / ((ground * ground + square).max(0.0).sqrt() + ground))
         };
         let tolerance = Tolerance {
@@ -258,7 +343,7 @@ impl Sky {
 
     /// Where a view ray runs through the air; `None` if it does not.
     pub(super) fn reach(&self, ray: &SkyRay) -> Option<Reach> {
-        let r = self.air.ground_radius + ray.eye_altitude.max(0.0);
+        let r = self.ground() + ray.eye_altitude.max(0.0);
         let closest = r * ray.dir[0].hypot(ray.dir[2]);
         let start = r * ray.dir[1];
         let half = half_chord(self.top_radius(), closest)?;
@@ -274,7 +359,7 @@ impl Sky {
             ground: false,
             space: true,
         };
-        if let (true, Some(floor)) = (start < 0.0, half_chord(self.air.ground_radius, closest)) {
+        if let (true, Some(floor)) = (start < 0.0, half_chord(self.ground(), closest)) {
             reach.end = (-floor - start).max(0.0);
             (reach.ground, reach.space) = (true, false);
         }
@@ -289,14 +374,14 @@ impl Sky {
 
     /// Place of a point of the ray, from the planet's centre.
     pub(super) fn place(&self, ray: &SkyRay, t: f64) -> [f64; 3] {
-        let eye = self.air.ground_radius + ray.eye_altitude.max(0.0);
+        let eye = self.ground() + ray.eye_altitude.max(0.0);
         add([0.0, eye, 0.0], scale(ray.dir, t))
     }
 
     /// The line from a place (from the planet's centre) to the sun, up to the top; `None` in the planet's shadow.
     pub(super) fn sun_chord(&self, place: [f64; 3], to_sun: [f64; 3]) -> Option<Chord> {
         let chord = self.sun_line(place, to_sun);
-        (chord.from >= 0.0 || chord.closest > self.air.ground_radius).then_some(chord)
+        (chord.from >= 0.0 || chord.closest > self.ground()).then_some(chord)
     }
 
     /// The same line whether lit or not.
@@ -319,41 +404,52 @@ impl Sky {
         }
     }
 
-    /// Transmittance of three columns.
-    pub fn transmittance(&self, columns: [f64; 3]) -> [f64; 3] {
+    /// Transmittance of columns.
+    pub fn transmittance(&self, columns: Amounts) -> [f64; 3] {
         self.extinction(columns).map(|depth| (-depth).exp())
     }
 
     /// Scattering coefficients times phase functions, per channel.
-    fn scattered(&self, densities: [f64; 3], nu: f64) -> [f64; 3] {
-        let mie =
-            self.air.mie_scattering * densities[1] * phase_cornette_shanks(nu, self.air.mie_g);
-        self.air
-            .rayleigh_scattering
-            .map(|rayleigh| rayleigh * densities[0] * phase_rayleigh(nu) + mie)
+    fn scattered(&self, densities: Amounts, nu: f64) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for scatterer in &self.scatterers {
+            let weight = densities[scatterer.profile] * scatterer.lobe.value(nu);
+            for (sum, scattering) in sum.iter_mut().zip(scatterer.scattering) {
+                *sum += scattering * weight;
+            }
+        }
+        sum
+    }
+
+    /// Where a ray crosses the altitudes at which layers bend.
+    pub(super) fn bends_along<'a>(&'a self, reach: &Reach) -> impl Iterator<Item = f64> + use<'a> {
+        let Reach {
+            chord, near, end, ..
+        } = *reach;
+        let start = chord.from - near;
+        let halves = self.bends.iter();
+        halves
+            .filter_map(move |level| half_chord(*level, chord.closest))
+            .flat_map(move |half| [-half - start, half - start])
+            .filter(move |t| *t > near && *t < end)
     }
 
     /// The lit stretches of a ray, cut where the integrand bends: at the border of the planet's shadow, at the lowest point,
-    /// at the ozone's edges and centre, and where the sun's rays graze those. All in closed form.
+    /// where layers bend, and where the sun's rays graze those places. All in closed form.
     pub(super) fn lit_stretches(&self, ray: &SkyRay, reach: &Reach) -> Vec<(f64, f64)> {
-        let r = self.air.ground_radius + ray.eye_altitude.max(0.0);
+        let r = self.ground() + ray.eye_altitude.max(0.0);
         let (d, s) = (ray.dir, ray.to_sun);
         let nu = dot(d, s);
         let mut cuts = vec![-r * d[1], -r * s[1] / nu];
-        let mut levels = vec![self.air.ground_radius];
-        if let Some(ozone) = self.ozone {
-            levels.extend(
-                [-ozone.half_width, 0.0, ozone.half_width]
-                    .map(|offset| self.air.ground_radius + ozone.centre + offset),
-            );
-        }
+        let mut levels = vec![self.ground()];
+        levels.extend(&self.bends);
         let cross = [
             d[1] * s[2] - d[2] * s[1],
             d[2] * s[0] - d[0] * s[2],
             d[0] * s[1] - d[1] * s[0],
         ];
         let aside = r * s[0].hypot(s[2]);
-        for (i, &level) in levels.iter().enumerate() {
+        for level in levels {
             // The sun's ray through the point passes the centre at the distance `level`.
             cuts.extend(
                 roots(
@@ -364,10 +460,8 @@ impl Sky {
                 .into_iter()
                 .flatten(),
             );
-            if let (true, Some(half)) = (i > 0, half_chord(level, reach.chord.closest)) {
-                cuts.extend([-half - r * d[1], half - r * d[1]]);
-            }
         }
+        cuts.extend(self.bends_along(reach));
         cuts.retain(|t| *t > reach.near && *t < reach.end);
         cuts.extend([reach.near, reach.end]);
         cuts.sort_by(f64::total_cmp);
@@ -387,7 +481,7 @@ impl Sky {
         });
         let sun = self.chord_columns(self.sun_line(place, ray.to_sun));
         let light = self.transmittance(std::array::from_fn(|k| view[k] + sun[k]));
-        let h = reach.chord.closest.hypot(offset + t) - self.air.ground_radius;
+        let h = reach.chord.closest.hypot(offset + t) - self.ground();
         let scattered = self.scattered(self.densities(h), dot(ray.dir, ray.to_sun));
         std::array::from_fn(|k| light[k] * scattered[k])
     }
@@ -403,12 +497,14 @@ impl Sky {
             return [0.0; 3];
         }
         let place = self.place(ray, reach.end);
-        let cosine = dot(place, ray.to_sun) / self.air.ground_radius;
+        let cosine = dot(place, ray.to_sun) / self.ground();
         if cosine <= 0.0 {
             return [0.0; 3];
         }
         let sun = self.sunlight(place, ray.to_sun);
-        std::array::from_fn(|k| transmittance[k] * lambert(self.ground_albedo[k], sun[k], cosine))
+        std::array::from_fn(|k| {
+            transmittance[k] * lambert(self.atmosphere.ground_albedo[k], sun[k], cosine)
+        })
     }
 
     /// Radiance of one scattering by adaptive Gauss-Kronrod quadrature, to the relative `tolerance` in every channel
@@ -449,7 +545,7 @@ impl Sky {
         let Some(reach) = self.reach(ray) else {
             return [0.0; 3];
         };
-        let ground = self.air.ground_radius;
+        let ground = self.ground();
         let eye = ground + ray.eye_altitude.max(0.0);
         let nu = dot(ray.dir, ray.to_sun);
         let altitude = |t: f64| {
@@ -504,12 +600,9 @@ impl Sky {
         let mut edges = vec![reach.near, reach.end, low];
         level_cuts(&mut edges, &sun_cosine, reach.near);
         level_cuts(&mut edges, &line, deepest);
-        if let Some(ozone) = self.ozone {
-            for offset in [-ozone.half_width, 0.0, ozone.half_width] {
-                let level = ozone.centre + offset;
-                level_cuts(&mut edges, &|t| altitude(t) - level, low);
-                level_cuts(&mut edges, &|t| line(t) - level, deepest);
-            }
+        for level in self.bends.iter().map(|radius| radius - ground) {
+            level_cuts(&mut edges, &|t| altitude(t) - level, low);
+            level_cuts(&mut edges, &|t| line(t) - level, deepest);
         }
         edges.sort_by(f64::total_cmp);
         let rule = Rule::new(order);
@@ -532,8 +625,8 @@ impl Sky {
                     let (h, mu) = (altitude(t).max(0.0), sun_cosine(t));
                     let out = {
                         let r = ground + h;
-                        let square =
-                            (self.air.top - h) * (self.top_radius() + r) + (r * mu) * (r * mu);
+                        let square = (self.atmosphere.thickness - h) * (self.top_radius() + r)
+                            + (r * mu) * (r * mu);
                         square.max(0.0).sqrt() - r * mu
                     };
                     let sun = self.columns_adaptive(h, mu, out);

@@ -4,12 +4,12 @@
 
 use super::math::{add, dot, length, scale};
 use super::monte_carlo::{
-    Measured, Random, Tally, direction_about, lambert, sample_cornette_shanks, sample_lambert,
-    sample_rayleigh,
+    Measured, Random, Tally, direction_about, lambert, sample_lambert, sample_lobe,
 };
 use super::parallel::parallel_map;
-use super::phase::{phase_cornette_shanks, phase_rayleigh};
 use super::sky::{Chord, Reach, Sky, SkyRay};
+use crate::atmosphere::{Lobe, MOST_LANES};
+use std::f64::consts::PI;
 
 /// How distances and transmittances are found. Both are unbiased and share no step of that.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,6 +29,10 @@ pub struct Paths {
     pub samples: usize,
     /// Scatterings and reflections counted at most; 1 is single scattering and the ground under the sun alone.
     pub max_order: u32,
+    /// Scatterings and reflections counted at least, from 1; 2 leaves out what quadrature knows exactly.
+    pub first_order: u32,
+    /// Whether the light that the ground at the end of the view ray sends straight to the eye is counted.
+    pub seen_ground: bool,
     /// Seed of the random numbers.
     pub seed: u64,
     /// How the estimate is made.
@@ -45,6 +49,8 @@ impl Default for Paths {
         Self {
             samples: 1024,
             max_order: 1000,
+            first_order: 1,
+            seen_ground: true,
             seed: 1,
             estimator: Estimator::Quadrature,
             sun: 1.0,
@@ -65,12 +71,30 @@ enum End {
     Limit,
 }
 
+/// What a place scatters.
+struct Scattering {
+    /// By each scatterer.
+    parts: [f64; MOST_LANES],
+    /// By all.
+    sum: f64,
+}
+
+const NOTHING: Scattering = Scattering {
+    parts: [0.0; MOST_LANES],
+    sum: 0.0,
+};
+
 /// One channel of one ray's paths.
 struct Tracer<'a> {
     sky: &'a Sky,
     paths: &'a Paths,
     to_sun: [f64; 3],
     channel: usize,
+    albedo: f64,
+    /// The channel's extinction of each profile.
+    extinctions: [f64; MOST_LANES],
+    /// The channel's scattering of each scatterer, which profile it has, and its lobe.
+    scatterers: Vec<(f64, usize, Lobe)>,
 }
 
 /// Stretches of the view ray with the probability of each.
@@ -94,38 +118,84 @@ impl Bins {
     }
 }
 
-impl Tracer<'_> {
+impl<'a> Tracer<'a> {
+    fn new(sky: &'a Sky, paths: &'a Paths, to_sun: [f64; 3], channel: usize) -> Self {
+        let mut extinctions = [0.0; MOST_LANES];
+        for (to, from) in extinctions.iter_mut().zip(&sky.extinctions) {
+            *to = from[channel];
+        }
+        Self {
+            sky,
+            paths,
+            to_sun,
+            channel,
+            albedo: sky.atmosphere().ground_albedo[channel],
+            extinctions,
+            scatterers: sky
+                .scatterers
+                .iter()
+                .map(|s| (s.scattering[channel], s.profile, s.lobe))
+                .collect(),
+        }
+    }
+
     fn radius(&self) -> f64 {
-        self.sky.air.ground_radius
+        self.sky.ground()
     }
 
     fn altitude(&self, place: [f64; 3]) -> f64 {
         (length(place) - self.radius()).max(0.0)
     }
 
-    /// Extinction, and the scattering of air and aerosol, at an altitude.
-    fn coefficients(&self, h: f64) -> (f64, [f64; 2]) {
-        let densities = self.sky.densities(h);
-        (
-            self.sky.extinction(densities)[self.channel],
-            [
-                self.sky.air.rayleigh_scattering[self.channel] * densities[0],
-                self.sky.air.mie_scattering * densities[1],
-            ],
-        )
+    /// Extinction of densities.
+    fn extinction(&self, densities: &[f64; MOST_LANES]) -> f64 {
+        let count = self.sky.profiles.len();
+        let pairs = densities[..count].iter().zip(&self.extinctions);
+        pairs.map(|(d, e)| d * e).sum()
     }
 
-    /// A bound on the extinction above an altitude.
+    /// Scattering of densities.
+    fn scattering(&self, densities: &[f64; MOST_LANES]) -> Scattering {
+        let mut parts = [0.0; MOST_LANES];
+        let mut sum = 0.0;
+        for (part, (scattering, profile, _)) in parts.iter_mut().zip(&self.scatterers) {
+            *part = scattering * densities[*profile];
+            sum += *part;
+        }
+        Scattering { parts, sum }
+    }
+
+    fn scattering_at(&self, place: [f64; 3]) -> Scattering {
+        self.scattering(&self.sky.densities(self.altitude(place)))
+    }
+
+    /// Mean of the phase functions at a place.
+    fn phase(&self, scattering: &Scattering, nu: f64) -> f64 {
+        let parts = self.scatterers.iter().zip(scattering.parts);
+        let sum: f64 = parts
+            .filter(|(_, part)| *part > 0.0)
+            .map(|((_, _, lobe), part)| part * lobe.value(nu))
+            .sum();
+        if scattering.sum > 0.0 {
+            sum / scattering.sum
+        } else {
+            0.0
+        }
+    }
+
+    /// A bound on the extinction above an altitude, above 0.
     fn majorant(&self, lowest: f64) -> f64 {
-        let [air, aerosol, _] = self.sky.densities(lowest);
-        let ozone = self.sky.ozone.map_or(0.0, |ozone| {
-            if lowest > ozone.centre {
-                self.sky.densities(lowest)[2]
-            } else {
-                1.0
-            }
-        });
-        self.sky.extinction([air, aerosol, ozone])[self.channel]
+        let mut densities = [0.0; MOST_LANES];
+        for (density, profile) in densities.iter_mut().zip(&self.sky.profiles) {
+            *density = profile.greatest_above(lowest);
+        }
+        self.extinction(&densities).max(1e-300)
+    }
+
+    /// Share of the light met at a place that is scattered, not absorbed.
+    fn survival(&self, place: [f64; 3]) -> f64 {
+        let densities = self.sky.densities(self.altitude(place));
+        self.scattering(&densities).sum / self.extinction(&densities)
     }
 
     /// Delta tracking along a ray from a place inside the air, up to `limit`.
@@ -165,7 +235,8 @@ impl Tracer<'_> {
                 };
             }
             let there = add(place, scale(dir, t));
-            if random.unit() * majorant < self.coefficients(self.altitude(there)).0 {
+            let densities = self.sky.densities(self.altitude(there));
+            if random.unit() * majorant < self.extinction(&densities) {
                 return End::Air(there);
             }
         }
@@ -193,7 +264,7 @@ impl Tracer<'_> {
                 return left;
             }
             let h = closest.hypot(t) - self.radius();
-            left *= (1.0 - self.coefficients(h).0 / majorant).max(0.0);
+            left *= (1.0 - self.extinction(&self.sky.densities(h)) / majorant).max(0.0);
         }
     }
 
@@ -207,24 +278,25 @@ impl Tracer<'_> {
         mut at_ground: bool,
         random: &mut Random,
     ) -> f64 {
-        let g = self.sky.air.mie_g;
         let little = 0.02 * weight;
         let mut sum = 0.0;
         for order in 1..=self.paths.max_order {
-            let (_, [air, aerosol]) = self.coefficients(self.altitude(place));
-            if self.paths.sun > 0.0 {
+            let scattering = if at_ground {
+                NOTHING
+            } else {
+                self.scattering_at(place)
+            };
+            if self.paths.sun > 0.0 && order >= self.paths.first_order {
                 let towards = if at_ground {
                     lambert(1.0, 1.0, dot(place, self.to_sun) / length(place))
                 } else {
-                    let nu = dot(dir, self.to_sun);
-                    (air * phase_rayleigh(nu) + aerosol * phase_cornette_shanks(nu, g))
-                        / (air + aerosol)
+                    self.phase(&scattering, dot(dir, self.to_sun))
                 };
                 if towards > 0.0 {
                     sum += weight * self.paths.sun * towards * self.sunlight(place, random);
                 }
             }
-            if order == self.paths.max_order && self.paths.uniform == 0.0 {
+            if weight == 0.0 || (order == self.paths.max_order && self.paths.uniform == 0.0) {
                 break;
             }
             dir = if at_ground {
@@ -233,19 +305,29 @@ impl Tracer<'_> {
                     sample_lambert(random),
                     random,
                 )
-            } else if random.unit() * (air + aerosol) < air {
-                direction_about(dir, sample_rayleigh(random), random)
             } else {
-                direction_about(dir, sample_cornette_shanks(g, random), random)
+                let mut left = random.unit() * scattering.sum;
+                let lobe = self
+                    .scatterers
+                    .iter()
+                    .zip(scattering.parts)
+                    .find(|(_, part)| {
+                        left -= part;
+                        left < 0.0
+                    });
+                // Rounding may leave nothing; what scatters last is as good then.
+                match lobe.map(|(s, _)| s).or(self.scatterers.last()) {
+                    Some((_, _, lobe)) => direction_about(dir, sample_lobe(lobe, random), random),
+                    None => break,
+                }
             };
             match self.fly(place, dir, f64::INFINITY, random) {
                 End::Air(there) => {
-                    let (extinction, [air, aerosol]) = self.coefficients(self.altitude(there));
-                    weight *= (air + aerosol) / extinction;
+                    weight *= self.survival(there);
                     (place, at_ground) = (there, false);
                 }
                 End::Ground(there) => {
-                    weight *= self.sky.ground_albedo[self.channel];
+                    weight *= self.albedo;
                     (place, at_ground) = (there, true);
                 }
                 End::Space => {
@@ -270,11 +352,9 @@ impl Tracer<'_> {
         let entry = self.sky.place(ray, reach.near);
         let (place, weight, at_ground) =
             match self.fly(entry, ray.dir, ray.distance - reach.near, random) {
-                End::Air(there) => {
-                    let (extinction, [air, aerosol]) = self.coefficients(self.altitude(there));
-                    (there, (air + aerosol) / extinction, false)
-                }
-                End::Ground(there) => (there, self.sky.ground_albedo[self.channel], true),
+                End::Air(there) => (there, self.survival(there), false),
+                End::Ground(there) if self.paths.seen_ground => (there, self.albedo, true),
+                End::Ground(_) => return 0.0,
                 End::Space => return self.paths.uniform,
                 End::Limit => return 0.0,
             };
@@ -293,24 +373,33 @@ impl Tracer<'_> {
         for i in 0..=count {
             edges.push(low + (reach.end - low) * (f64::from(i) / f64::from(count)).powi(2));
         }
+        // A stretch in which a layer begins or ends may look empty from its middle, and must not be.
+        edges.extend(self.sky.bends_along(reach));
+        edges.sort_by(f64::total_cmp);
         edges.dedup();
         let nu = dot(ray.dir, self.to_sun);
-        let g = self.sky.air.mie_g;
         let mut sum = 0.0;
         let mut cumulative: Vec<f64> = edges
             .windows(2)
             .map(|pair| {
                 let t = 0.5 * (pair[0] + pair[1]);
                 let place = self.sky.place(ray, t);
-                let (_, [air, aerosol]) = self.coefficients(self.altitude(place));
+                let scattering = self.scattering_at(place);
                 let sun = self.sky.sunlight(place, self.to_sun)[self.channel];
+                let phase = if self.paths.first_order > 1 {
+                    1.0 / (4.0 * PI)
+                } else {
+                    self.phase(&scattering, nu)
+                };
                 let around = 0.02;
-                let guess = air * (phase_rayleigh(nu) * sun + around)
-                    + aerosol * (phase_cornette_shanks(nu, g) * sun + around);
+                let guess = scattering.sum * (phase * sun + around);
                 sum += guess * self.view_transmittance(reach, t) * (pair[1] - pair[0]);
                 sum
             })
             .collect();
+        if sum == 0.0 {
+            edges.clear();
+        }
         cumulative.iter_mut().for_each(|c| *c /= sum);
         Bins { edges, cumulative }
     }
@@ -337,8 +426,8 @@ impl Tracer<'_> {
         if reach.space {
             sum += left * self.paths.uniform;
         }
-        let albedo = self.sky.ground_albedo[self.channel];
-        if reach.ground && albedo > 0.0 {
+        let albedo = self.albedo;
+        if reach.ground && albedo > 0.0 && self.paths.seen_ground {
             let there = self.sky.place(ray, reach.end);
             let there = scale(there, self.radius() / length(there));
             sum += self.gather(there, ray.dir, left * albedo, true, random);
@@ -346,8 +435,8 @@ impl Tracer<'_> {
         if bins.edges.len() > 1 {
             let (t, density) = bins.sample(random);
             let place = self.sky.place(ray, t);
-            let (_, [air, aerosol]) = self.coefficients(self.altitude(place));
-            let weight = (air + aerosol) * self.view_transmittance(reach, t) / density;
+            let weight =
+                self.scattering_at(place).sum * self.view_transmittance(reach, t) / density;
             sum += self.gather(place, ray.dir, weight, false, random);
         }
         sum
@@ -368,12 +457,7 @@ pub fn trace_sky(sky: &Sky, ray: &SkyRay, paths: &Paths, stream: u64) -> Measure
         };
     };
     let tallies = std::array::from_fn(|channel| {
-        let tracer = Tracer {
-            sky,
-            paths,
-            to_sun: ray.to_sun,
-            channel,
-        };
+        let tracer = Tracer::new(sky, paths, ray.to_sun, channel);
         let mut random = Random::new(
             paths.seed,
             stream.wrapping_mul(3).wrapping_add(channel as u64),

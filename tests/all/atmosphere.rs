@@ -226,10 +226,7 @@ fn grazes(air: &Atmosphere, row: &Sky, steps: i32) -> bool {
 
 /// Light of the sky seen from 300 m by adaptive quadrature.
 fn true_sky(air: &Atmosphere, dir: [f64; 3], to_sun: [f64; 3]) -> SkyRadiance {
-    let sky = sky::Sky {
-        air: *air,
-        ..sky::Sky::default()
-    };
+    let sky = sky::Sky::new(&(*air).into()).unwrap();
     let ray = SkyRay {
         eye_altitude: 300.0,
         dir,

@@ -15,6 +15,7 @@ mod noise;
 mod periodic;
 mod phase;
 mod planet;
+mod probe;
 mod reference;
 mod simplex;
 mod sweep;

@@ -3,7 +3,7 @@
 
 use crate::common::{Random, cpu_seconds};
 use std::f64::consts::PI;
-use veduta::reference::atmosphere::Atmosphere;
+use veduta::atmosphere::{Atmosphere, Layer, Phase, Profile};
 use veduta::reference::clouds::{CloudLayer, cloud_density, march_clouds, slab_single_scatter};
 use veduta::reference::intersect::{Bracketing, Search, first_crossing, lipschitz_of_terrain};
 use veduta::reference::math::{dot, normalize};
@@ -13,7 +13,7 @@ use veduta::reference::monte_carlo::{
 use veduta::reference::parallel::parallel_map;
 use veduta::reference::phase::{phase_cornette_shanks, phase_henyey_greenstein, phase_rayleigh};
 use veduta::reference::quadrature::{KRONROD, Rule, Tolerance, integrate_kronrod};
-use veduta::reference::sky::{Ozone, Sky, SkyRay};
+use veduta::reference::sky::{Sky, SkyRay};
 use veduta::reference::sky_paths::{Estimator, Paths, trace_skies};
 use veduta::reference::volume::{Region, Volume, VolumePaths, VolumeRay};
 
@@ -48,12 +48,19 @@ fn worst(list: impl IntoIterator<Item = f64>) -> f64 {
     list.into_iter().fold(0.0, f64::max)
 }
 
+/// An atmosphere that comes with the crate, with a change.
+fn changed(name: &str, change: impl FnOnce(&mut Atmosphere)) -> Sky {
+    let mut atmosphere = Atmosphere::named(name).unwrap();
+    change(&mut atmosphere);
+    Sky::new(&atmosphere).unwrap()
+}
+
+/// The thesis's air with ozone and coloured ground.
 fn earth() -> Sky {
-    Sky {
-        ozone: Some(Ozone::default()),
-        ground_albedo: [0.1, 0.2, 0.3],
-        ..Default::default()
-    }
+    changed("thesis", |a| {
+        a.layers.push(Atmosphere::default().layers[2].clone());
+        a.ground_albedo = [0.1, 0.2, 0.3];
+    })
 }
 
 #[test]
@@ -195,7 +202,7 @@ fn whole_line(closest: f64, ground: f64, height: f64) -> f64 {
 #[test]
 fn reference_sky_columns_are_those_of_closed_forms_and_of_a_second_method() {
     let sky = earth();
-    let (ground, top) = (sky.air.ground_radius, sky.air.top);
+    let (ground, top) = (sky.atmosphere().planet_radius, sky.atmosphere().thickness);
     let up = sky.columns(0.0, 1.0, top);
     let exact = |height: f64| -height * (-top / height).exp_m1();
     println!("vertical columns {up:?} m");
@@ -203,8 +210,9 @@ fn reference_sky_columns_are_those_of_closed_forms_and_of_a_second_method() {
     assert!((up[1] / exact(1200.0) - 1.0).abs() < 1e-12);
     assert!((up[2] / 15_000.0 - 1.0).abs() < 1e-10);
     // A line through everything, with a top so high that nothing is missed.
-    let mut endless = sky;
-    endless.air.top = 4e6;
+    let mut endless = sky.atmosphere().clone();
+    endless.thickness = 4e6;
+    let endless = Sky::new(&endless).unwrap();
     for h in [0.0, 100.0, 5000.0, 30_000.0] {
         let to = ((ground + 4e6).powi(2) - (ground + h).powi(2)).sqrt();
         let half = endless.columns(h, 0.0, to);
@@ -251,7 +259,7 @@ fn reference_sky_columns_are_those_of_closed_forms_and_of_a_second_method() {
 
 /// Rays from the ground, from within the air and from space, with suns at every height and many near the horizon.
 fn sky_rays(count: usize, seed: u64) -> Vec<SkyRay> {
-    let ground = Atmosphere::default().ground_radius;
+    let ground = Atmosphere::default().planet_radius;
     let mut random = Random(seed);
     (0..count)
         .map(|i| {
@@ -356,7 +364,8 @@ fn reference_sky_scattered_once_keeps_1e_6_on_1000_rays_by_two_methods() {
 #[test]
 fn reference_sky_scattered_once_agrees_with_closed_forms() {
     // Straight at the sun every path is as long as the ray: the columns times exp(-depth).
-    let sky = Sky::default();
+    let sky = changed("thesis", |_| {});
+    let air = sky.atmosphere();
     let mut random = Random(33);
     let mut largest: f64 = 0.0;
     for _ in 0..100 {
@@ -369,30 +378,28 @@ fn reference_sky_scattered_once_agrees_with_closed_forms() {
             to_sun: dir,
             distance: f64::INFINITY,
         };
-        let r = sky.air.ground_radius + h;
-        if y < 0.0 && r * (1.0 - y * y).sqrt() < sky.air.ground_radius {
+        let r = air.planet_radius + h;
+        if y < 0.0 && r * (1.0 - y * y).sqrt() < air.planet_radius {
             continue;
         }
         let found = sky.single_scatter(&ray, 1e-10);
-        let out =
-            ((sky.air.ground_radius + sky.air.top).powi(2) - r * r * (1.0 - y * y)).sqrt() - r * y;
+        let out = (air.top_radius().powi(2) - r * r * (1.0 - y * y)).sqrt() - r * y;
         let columns = sky.columns_adaptive(h, y, out);
         let left = sky.transmittance(columns);
         for (k, left) in left.iter().enumerate() {
             let exact = left
-                * (sky.air.rayleigh_scattering[k] * columns[0] * phase_rayleigh(1.0)
-                    + sky.air.mie_scattering
-                        * columns[1]
-                        * phase_cornette_shanks(1.0, sky.air.mie_g));
+                * (air.layers[0].scattering[k] * columns[0] * phase_rayleigh(1.0)
+                    + air.layers[1].scattering[k] * columns[1] * phase_cornette_shanks(1.0, 0.76));
             largest = largest.max((found.in_scatter[k] / exact - 1.0).abs());
         }
     }
     println!("towards the sun: {largest:.1e} from the closed form");
     assert!(largest < 1e-9);
     // Straight down from space under the sun, air alone: (1 - exp(-2 depth)) / 2.
-    let mut clear = Sky::default();
-    (clear.air.mie_scattering, clear.air.mie_extinction) = (0.0, 0.0);
-    clear.ground_albedo = [0.5; 3];
+    let clear = changed("thesis", |a| {
+        a.layers.truncate(1);
+        a.ground_albedo = [0.5; 3];
+    });
     let down = SkyRay {
         eye_altitude: 4e5,
         dir: [0.0, -1.0, 0.0],
@@ -401,7 +408,7 @@ fn reference_sky_scattered_once_agrees_with_closed_forms() {
     };
     let found = clear.single_scatter(&down, 1e-10);
     for k in 0..3 {
-        let depth = clear.air.rayleigh_scattering[k] * 8000.0 * -(-12.5f64).exp_m1();
+        let depth = clear.atmosphere().layers[0].scattering[k] * 8000.0 * -(-12.5f64).exp_m1();
         let exact = -0.5 * (-2.0 * depth).exp_m1() * phase_rayleigh(-1.0);
         let reflected = 0.5 / PI * (-2.0 * depth).exp();
         assert!((found.in_scatter[k] / exact - 1.0).abs() < 1e-9);
@@ -669,12 +676,10 @@ fn reference_sky_paths_of_order_one_are_the_quadrature() {
 
 #[test]
 fn reference_sky_is_a_white_furnace() {
-    let mut sky = Sky {
-        ozone: None,
-        ground_albedo: [1.0; 3],
-        ..Default::default()
-    };
-    sky.air.mie_extinction = sky.air.mie_scattering;
+    let sky = changed("thesis", |a| {
+        a.layers[1].absorption = [0.0; 3];
+        a.ground_albedo = [1.0; 3];
+    });
     let rays = sky_rays(60, 38)
         .into_iter()
         .map(|ray| SkyRay {
@@ -706,6 +711,123 @@ fn reference_sky_is_a_white_furnace() {
     };
     for m in trace_skies(&sky, &rays, &tracked) {
         assert_eq!(m.mean, [1.0; 3], "every path leaves with all its light");
+    }
+}
+
+/// Everything that an atmosphere may have: eight lobes, five profiles, haze that begins and ends within the air.
+fn many_layers() -> Atmosphere {
+    let layer = |name: &str, profile, scattering, absorption, phase| Layer {
+        name: name.to_owned(),
+        profile,
+        scattering,
+        absorption,
+        phase,
+    };
+    let mut air = Atmosphere::default();
+    air.layers[1].phase = Phase::TwoLobes {
+        forward: 0.8,
+        backward: -0.4,
+        backward_share: 0.2,
+    };
+    air.layers.extend([
+        layer(
+            "a cloud",
+            Profile::Constant {
+                bottom: 3000.0,
+                top: 5000.0,
+            },
+            [2e-5, 1e-5, 3e-5],
+            [1e-6; 3],
+            Phase::Draine { g: 0.6, alpha: 3.0 },
+        ),
+        layer(
+            "a high haze",
+            Profile::Tent {
+                bottom: 60_000.0,
+                peak: 70_000.0,
+                top: 85_000.0,
+            },
+            [1e-6, 2e-6, 3e-6],
+            [0.0; 3],
+            Phase::CornetteShanksMean { u: 0.7 },
+        ),
+        layer(
+            "more of the air",
+            Profile::Exponential {
+                scale_height: 8000.0,
+            },
+            [1e-6; 3],
+            [1e-7; 3],
+            Phase::Isotropic,
+        ),
+        layer(
+            "smoke",
+            Profile::Exponential {
+                scale_height: 2500.0,
+            },
+            [1e-6; 3],
+            [3e-6, 4e-6, 5e-6],
+            Phase::HenyeyGreenstein { g: -0.2 },
+        ),
+    ]);
+    air
+}
+
+#[test]
+fn reference_sky_takes_any_layers_by_two_methods_and_two_estimators() {
+    for atmosphere in [many_layers(), Atmosphere::named("mars").unwrap()] {
+        let sky = Sky::new(&atmosphere).unwrap();
+        let rays: Vec<SkyRay> = sky_rays(200, 44);
+        let apart = |i: usize, panels: usize| {
+            let a = sky.single_scatter(&rays[i], 1e-9).in_scatter;
+            let b = sky.single_scatter_composite(&rays[i], panels, 12);
+            let lit = (0..3).filter(|k| a[*k] != b[*k]);
+            worst(lit.map(|k| (a[k] - b[k]).abs() / a[k]))
+        };
+        let coarse = parallel_map(rays.len(), |i| apart(i, 12));
+        let mut order: Vec<usize> = (0..rays.len()).collect();
+        order.sort_by(|i, j| coarse[*j].total_cmp(&coarse[*i]));
+        let fine = worst(parallel_map(12, |k| apart(order[k], 60)));
+        println!(
+            "{} layers: the two methods differ by {:.1e} at most, {:.1e} in the middle; with five times the panels by {fine:.1e}",
+            atmosphere.layers.len(),
+            coarse[order[0]],
+            coarse[order[rays.len() / 2]],
+        );
+        // Layers with edges have roots at every border, where panels of equal width converge with the power 3/2.
+        assert!(coarse[order[0]] < 5e-5 && coarse[order[100]] < 1e-9);
+        assert!(fine < 2e-6);
+        let rays = day_rays(60, 45);
+        let exact = parallel_map(rays.len(), |i| sky.single_scatter(&rays[i], 1e-9));
+        let run = |paths: Paths| trace_skies(&sky, &rays, &paths);
+        // All orders by tracking, against the first by quadrature and the others by importance.
+        let tracked = run(Paths {
+            samples: 12_000,
+            seed: 5,
+            estimator: Estimator::Tracking,
+            seen_ground: false,
+            ..Default::default()
+        });
+        let others = run(Paths {
+            samples: 2000,
+            seed: 6,
+            first_order: 2,
+            seen_ground: false,
+            ..Default::default()
+        });
+        let mut scores = vec![];
+        for ((t, o), e) in tracked.iter().zip(&others).zip(&exact) {
+            for k in 0..3 {
+                let sum = o.mean[k] + e.in_scatter[k];
+                scores.push(z_score(
+                    t.mean[k],
+                    t.standard_error[k],
+                    sum,
+                    o.standard_error[k],
+                ));
+            }
+        }
+        assert_honest("tracked against quadrature and placed", &scores);
     }
 }
 

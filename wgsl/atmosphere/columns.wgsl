@@ -64,9 +64,9 @@ fn column_scale(air: Air, h: f32, mu: f32) -> Lanes {
     let below = (air.ground_radius + h) * mu * mu / (1.0 + sqrt(max((1.0 - mu) * (1.0 + mu), 0.0)));
     let lowest = max(select(h, h - below, mu < 0.0), 0.0);
     var scale = Lanes(exp(air.low.fall * lowest), vec4<f32>(1.0));
-    if air.lane_count > 4u {
-        scale.high = exp(air.high.fall * lowest);
-    }
+#ifdef AIR_EIGHT_LANES
+    scale.high = exp(air.high.fall * lowest);
+#endif
     return scale;
 }
 
@@ -134,9 +134,9 @@ fn sun_depth(columns: texture_2d_array<f32>, linear: sampler, air: Air, h: f32, 
     let place = texture_place(column_coordinates(air.ground_radius, air.top, h, seen), size);
     var lanes = column_scale(air, h, seen);
     lanes.low *= textureSampleLevel(columns, linear, place, 0, 0.0) * air.top;
-    if air.lane_count > 4u {
-        lanes.high *= textureSampleLevel(columns, linear, place, 1, 0.0) * air.top;
-    }
+#ifdef AIR_EIGHT_LANES
+    lanes.high *= textureSampleLevel(columns, linear, place, 1, 0.0) * air.top;
+#endif
     return air_extinction(air, lanes);
 }
 

@@ -88,15 +88,16 @@ fn four_densities(layers: FourLayers, h: f32) -> vec4<f32> {
 fn air_densities(air: Air, h: f32) -> Lanes {
     let altitude = max(h, 0.0);
     var densities = Lanes(four_densities(air.low, altitude), vec4<f32>(0.0));
-    if air.lane_count > 4u {
-        densities.high = four_densities(air.high, altitude);
-    }
+#ifdef AIR_EIGHT_LANES
+    densities.high = four_densities(air.high, altitude);
+#endif
     return densities;
 }
 
 /// Extinction of amounts (densities), or optical depth of columns [m], per channel.
 ///
-/// domain  amounts in [0, 1] 1 lin
+/// domain  amounts.low in [0, 1] 1 lin
+/// domain  amounts.high in [0, 1] 1 lin
 /// range   [0, 1] 1/m
 /// error   4e-7 rel of reference::medium::air_extinction
 /// source  sum over the layers
@@ -106,22 +107,25 @@ fn air_extinction(air: Air, amounts: Lanes) -> vec3<f32> {
         dot(air.low.extinction_green, amounts.low),
         dot(air.low.extinction_blue, amounts.low),
     );
-    if air.lane_count > 4u {
-        sum += vec3<f32>(
-            dot(air.high.extinction_red, amounts.high),
-            dot(air.high.extinction_green, amounts.high),
-            dot(air.high.extinction_blue, amounts.high),
-        );
-    }
+#ifdef AIR_EIGHT_LANES
+    sum += vec3<f32>(
+        dot(air.high.extinction_red, amounts.high),
+        dot(air.high.extinction_green, amounts.high),
+        dot(air.high.extinction_blue, amounts.high),
+    );
+#endif
     return sum;
 }
 
 /// Scattering of amounts, each lane weighted (with its phase function, say), per channel.
 ///
-/// domain  amounts in [0, 1] 1 lin
-/// domain  weights in [0, 10] 1/sr lin
+/// domain  amounts.low in [0, 1] 1 lin
+/// domain  amounts.high in [0, 1] 1 lin
+/// domain  weights.low in [0, 10] 1/sr lin
+/// domain  weights.high in [0, 10] 1/sr lin
 /// range   [0, 10] 1/m
 /// error   6e-7 rel of reference::medium::air_scattering
+/// outside undefined
 /// source  sum over the layers
 fn air_scattering(air: Air, amounts: Lanes, weights: Lanes) -> vec3<f32> {
     let low = amounts.low * weights.low;
@@ -130,14 +134,14 @@ fn air_scattering(air: Air, amounts: Lanes, weights: Lanes) -> vec3<f32> {
         dot(air.low.scattering_green, low),
         dot(air.low.scattering_blue, low),
     );
-    if air.lane_count > 4u {
-        let high = amounts.high * weights.high;
-        sum += vec3<f32>(
-            dot(air.high.scattering_red, high),
-            dot(air.high.scattering_green, high),
-            dot(air.high.scattering_blue, high),
-        );
-    }
+#ifdef AIR_EIGHT_LANES
+    let high = amounts.high * weights.high;
+    sum += vec3<f32>(
+        dot(air.high.scattering_red, high),
+        dot(air.high.scattering_green, high),
+        dot(air.high.scattering_blue, high),
+    );
+#endif
     return sum;
 }
 
@@ -155,12 +159,13 @@ fn four_phases(layers: FourLayers, nu: f32) -> vec4<f32> {
 /// domain  nu in [-1, 1] 1 lin
 /// range   [0, 1e6] 1/sr
 /// error   2e-4 rel of reference::medium::air_phases
+/// outside undefined
 /// source  Cornette1992, Henyey1941, Draine2003 in one form
 fn air_phases(air: Air, nu: f32) -> Lanes {
     var phases = Lanes(four_phases(air.low, nu), vec4<f32>(0.0));
-    if air.lane_count > 4u {
-        phases.high = four_phases(air.high, nu);
-    }
+#ifdef AIR_EIGHT_LANES
+    phases.high = four_phases(air.high, nu);
+#endif
     return phases;
 }
 
@@ -169,6 +174,7 @@ fn air_phases(air: Air, nu: f32) -> Lanes {
 /// domain  nu in [-1, 1] 1 lin
 /// range   [0, 1e6] 1/sr
 /// error   2e-4 rel of reference::medium::peak_phase
+/// outside undefined
 /// source  as air_phases
 fn peak_phase(air: Air, nu: f32) -> f32 {
     let gap = 1.0 - air.peak_g;

@@ -21,9 +21,9 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     let scale = column_scale(air, place.x, place.y);
     let unit = 1.0 / air.top;
     textureStore(columns, id.xy, 0, lanes.low * unit / max(scale.low, vec4<f32>(1e-30)));
-    if air.lane_count > 4u {
-        textureStore(columns, id.xy, 1, lanes.high * unit / max(scale.high, vec4<f32>(1e-30)));
-    }
+#ifdef AIR_EIGHT_LANES
+    textureStore(columns, id.xy, 1, lanes.high * unit / max(scale.high, vec4<f32>(1e-30)));
+#endif
 }
     }#
 }#

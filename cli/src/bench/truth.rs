@@ -94,10 +94,7 @@ impl Truth {
             .collect();
         let irradiance = wide(view.sun.irradiance);
         let found: Vec<([f64; 3], [f64; 3])> = if effect == Effect::Atmosphere {
-            let sky = Sky {
-                air: air(settings),
-                ..Sky::default()
-            };
+            let sky = Sky::new(&air(settings).into())?;
             parallel_map(chosen.len(), |k| {
                 let light = sky.single_scatter(
                     &SkyRay {

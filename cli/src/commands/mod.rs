@@ -7,5 +7,6 @@ pub mod diff;
 pub mod eval;
 pub mod lint;
 pub mod list;
+pub mod probe;
 pub mod render;
 pub mod stress;

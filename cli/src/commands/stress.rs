@@ -10,8 +10,8 @@ use crate::commands::render::write_json;
 use crate::error::CliError;
 use crate::image::check_folder;
 use crate::stress::report::Report;
-use crate::stress::twins::registry;
-use crate::stress::{Plan, effects, energy, functions};
+use crate::stress::twins::{ELSEWHERE, registry};
+use crate::stress::{Plan, effects, elsewhere, energy, functions};
 
 /// Arguments of `veduta stress`.
 #[derive(Debug, Clone, clap::Args)]
@@ -136,6 +136,7 @@ pub fn run(args: &StressArgs) -> Result<(), CliError> {
     bar.finish_and_clear();
     let report = Report {
         findings,
+        elsewhere: elsewhere(&library, ELSEWHERE)?,
         integral_evaluations,
         integral_faults,
         pictures,

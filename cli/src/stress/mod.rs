@@ -1,5 +1,6 @@
 //! Adversarial inputs for every public function and every effect, on the device, with the bits read back.
 
+pub mod airs;
 pub mod check;
 pub mod effects;
 pub mod energy;
@@ -17,7 +18,7 @@ use veduta_compose::Library;
 
 use self::check::{Finding, Work};
 use self::subject::Subject;
-use self::twins::Entry;
+use self::twins::{ELSEWHERE, Entry};
 use crate::error::CliError;
 
 /// How much is done.
@@ -66,6 +67,41 @@ pub fn pairs<'a>(
         .collect()
 }
 
+/// The functions that read textures, which no row of numbers can hold, each with the test that judges it.
+///
+/// # Errors
+/// Faults of headers; [`CliError::Missing`] for a function that the table does not name, and for a row without a function.
+pub fn elsewhere<'a>(
+    library: &Library,
+    table: &[(&'a str, &'a str)],
+) -> Result<Vec<(String, &'a str)>, CliError> {
+    let missing = |what, name: &str| {
+        CliError::Missing {
+        what,
+        name: name.to_owned(),
+        hint: "every public function that reads a texture has one row, with the test that judges it, in the table ELSEWHERE of cli/src/stress/twins.rs"
+            .to_owned(),
+    }
+    };
+    let textured = Subject::textured(library)?;
+    if let Some((lost, _)) = table
+        .iter()
+        .find(|(path, _)| textured.iter().all(|t| t != path))
+    {
+        return Err(missing("public function with textures", lost));
+    }
+    textured
+        .into_iter()
+        .map(|path| {
+            let mut found = table.iter().filter(|(known, _)| *known == path);
+            match (found.next(), found.next()) {
+                (Some((_, test)), None) => Ok((path, *test)),
+                _ => Err(missing("the only test of function", &path)),
+            }
+        })
+        .collect()
+}
+
 /// Shares evaluations out so that each function takes about the same time, none less than the least.
 pub fn shares(weights: &[f64], plan: &Plan) -> Vec<u64> {
     let mut counts = vec![plan.least; weights.len()];
@@ -105,6 +141,7 @@ pub fn functions(
     filter: &str,
     progress: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Vec<Finding>, CliError> {
+    elsewhere(library, ELSEWHERE)?;
     let subjects = Subject::all(library)?;
     let mut chosen = pairs(&subjects, entries)?;
     chosen.retain(|(subject, _)| subject.path.contains(filter));

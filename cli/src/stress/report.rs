@@ -12,6 +12,8 @@ use veduta_compose::header::ErrorKind;
 pub struct Report {
     /// One a function, by name.
     pub findings: Vec<Finding>,
+    /// Functions that read textures, each with the test that judges it.
+    pub elsewhere: Vec<(String, &'static str)>,
     /// Evaluations for integrals.
     pub integral_evaluations: u64,
     /// What is wrong with integrals.
@@ -136,6 +138,13 @@ impl Report {
             text += &notes.join("\n");
             text += "\n";
         }
+        if !self.elsewhere.is_empty() {
+            text += "\n## Judged elsewhere\n\nFunctions that read textures, and the tests of `tests/all` that hold them against their references.\n\n";
+            for (path, test) in &self.elsewhere {
+                let short = path.strip_prefix("veduta::").unwrap_or(path);
+                text += &format!("- `{short}`: `{test}`\n");
+            }
+        }
         let outside: Vec<String> = self
             .findings
             .iter()
@@ -186,6 +195,7 @@ impl Report {
         json!({
             "evaluations": self.evaluations(),
             "functions": functions,
+            "elsewhere": self.elsewhere.iter().map(|(function, test)| json!({ "function": function, "test": test })).collect::<Vec<_>>(),
             "pictures": self.pictures.as_ref().map(|p| json!({
                 "drawn": p.drawn,
                 "pixels": p.pixels,

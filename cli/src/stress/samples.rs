@@ -207,6 +207,9 @@ impl Samples {
                 (None, Some(header)) => (header.interval.clone(), header.spacing),
                 (None, None) => {
                     let hi = match leaf.scalar {
+                        Scalar::U32 if leaf.choices.is_some() => {
+                            f64::from(leaf.choices.unwrap_or(1) - 1)
+                        }
                         Scalar::U32 => f64::from(u32::MAX),
                         Scalar::Bool => 1.0,
                         _ => {

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use veduta::device::Gpu;
 use veduta::eval::{Evaluator, Spec};
-use veduta_compose::header::{Function, Param, parse_headers};
+use veduta_compose::header::{Function, Headers, Param, parse_headers};
 use veduta_compose::{Diags, Library};
 
+use super::airs;
 use crate::error::CliError;
 
 /// The type of a number.
@@ -53,6 +54,8 @@ pub struct Leaf {
     pub axis: Option<usize>,
     /// The type.
     pub scalar: Scalar,
+    /// How many values it chooses among, if it stands for a value that does not fit into columns.
+    pub choices: Option<u32>,
 }
 
 impl Leaf {
@@ -110,7 +113,17 @@ fn leaves(name: &str, ty: &str, structs: &Structs, found: &mut Vec<Leaf>) -> Opt
             name: name.to_owned(),
             axis: (count > 1).then_some(axis),
             scalar,
+            choices: None,
         }));
+        return Some(());
+    }
+    if ty == airs::TYPE {
+        found.push(Leaf {
+            name: name.to_owned(),
+            axis: None,
+            scalar: Scalar::U32,
+            choices: Some(airs::COUNT),
+        });
         return Some(());
     }
     let (_, members) = structs.get(ty)?;
@@ -149,6 +162,12 @@ fn build(ty: &str, structs: &Structs, column: &mut usize, imports: &mut Vec<Stri
         return String::new();
     };
     imports.push(format!("{module}::{ty}"));
+    if ty == airs::TYPE {
+        imports.push(format!("{module}::FourLayers"));
+        let k = *column;
+        *column += 1;
+        return format!("stress_air(in.u[{k}])");
+    }
     let parts: Vec<String> = members
         .iter()
         .map(|member| build(&member.ty, structs, column, imports))
@@ -156,21 +175,31 @@ fn build(ty: &str, structs: &Structs, column: &mut usize, imports: &mut Vec<Stri
     format!("{ty}({})", parts.join(", "))
 }
 
+/// The headers of all modules, by path.
+fn headers(library: &Library) -> Result<Vec<(String, Headers)>, CliError> {
+    let mut faults = Diags::new();
+    let mut headers = Vec::new();
+    for module in library.modules() {
+        match parse_headers(&module.file, &module.text) {
+            Ok(found) => headers.push((module.path.clone(), found)),
+            Err(more) => faults.append(more),
+        }
+    }
+    faults.ok(headers).map_err(CliError::from)
+}
+
+fn reads_textures(function: &Function) -> bool {
+    let mut types = function.params.iter().map(|p| p.ty.as_str());
+    types.any(|ty| ty.starts_with("texture_") || ty.starts_with("sampler"))
+}
+
 impl Subject {
-    /// The public functions of a library, by path.
+    /// The public functions of a library, by path, without those that read textures.
     ///
     /// # Errors
-    /// Faults of headers; a type that has no numbers, such as a texture.
+    /// Faults of headers; a type that has no numbers.
     pub fn all(library: &Library) -> Result<Vec<Subject>, CliError> {
-        let mut faults = Diags::new();
-        let mut headers = Vec::new();
-        for module in library.modules() {
-            match parse_headers(&module.file, &module.text) {
-                Ok(found) => headers.push((module.path.clone(), found)),
-                Err(more) => faults.append(more),
-            }
-        }
-        faults.ok(())?;
+        let headers = headers(library)?;
         let structs: Structs = headers
             .iter()
             .flat_map(|(path, found)| {
@@ -181,12 +210,29 @@ impl Subject {
         let mut subjects = Vec::new();
         for (module, found) in headers {
             for function in found.functions {
-                if !function.header.internal {
+                if !function.header.internal && !reads_textures(&function) {
                     subjects.push(Subject::new(&module, function, &structs)?);
                 }
             }
         }
         Ok(subjects)
+    }
+
+    /// The full names of the public functions of a library that read textures.
+    ///
+    /// # Errors
+    /// Faults of headers.
+    pub fn textured(library: &Library) -> Result<Vec<String>, CliError> {
+        let mut names = Vec::new();
+        for (module, found) in headers(library)? {
+            let functions = found.functions.iter();
+            names.extend(
+                functions
+                    .filter(|f| !f.header.internal && reads_textures(f))
+                    .map(|f| format!("{module}::{}", f.name)),
+            );
+        }
+        Ok(names)
     }
 
     fn new(module: &str, function: Function, structs: &Structs) -> Result<Subject, CliError> {
@@ -274,6 +320,11 @@ impl Subject {
     pub fn compile(&self, gpu: &Gpu, library: &Library) -> Result<Device, CliError> {
         let imports: Vec<&str> = self.imports.iter().map(String::as_str).collect();
         let result = self.function.result.clone().unwrap_or_default();
+        let airs = if self.inputs.iter().any(|leaf| leaf.choices.is_some()) {
+            airs::wgsl()
+        } else {
+            String::new()
+        };
         let parts = self
             .packs
             .iter()
@@ -290,7 +341,7 @@ impl Subject {
                     &Spec {
                         imports: &imports,
                         prelude: &format!(
-                            "fn stress_bits(r: {result}) -> {ty} {{ return {pack}; }}"
+                            "{airs}fn stress_bits(r: {result}) -> {ty} {{ return {pack}; }}"
                         ),
                         prelude_file: "",
                         expression: &format!("stress_bits({})", self.call),

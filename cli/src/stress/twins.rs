@@ -12,6 +12,8 @@ use veduta::reference::{
 };
 use veduta_compose::header::{Bound, Interval, Spacing};
 
+use super::airs;
+
 /// The most numbers that a result has.
 pub const MOST: usize = 8;
 
@@ -40,6 +42,9 @@ impl Values {
         &self.numbers[..self.count]
     }
 }
+
+/// Functions that read textures, each with the test of `tests/all` that judges it on the device.
+pub const ELSEWHERE: &[(&str, &str)] = &[];
 
 /// What is read from the columns of a row.
 pub trait Argument: Sized {
@@ -75,6 +80,17 @@ impl Argument for bool {
     const COLUMNS: usize = 1;
     fn read(bits: &[u32]) -> bool {
         bits[0] != 0
+    }
+}
+
+/// An atmosphere that a column chooses.
+#[derive(Debug, Clone, Copy)]
+pub struct Air(&'static veduta::Atmosphere);
+
+impl Argument for Air {
+    const COLUMNS: usize = 1;
+    fn read(bits: &[u32]) -> Air {
+        Air(airs::chosen(bits[0]))
     }
 }
 
@@ -954,6 +970,38 @@ pub fn registry() -> Vec<Entry> {
         atmosphere,
         sun_disc
     );
+    other!(
+        list,
+        "atmosphere::medium::air_densities",
+        "medium::air_densities",
+        |air: Air, h: f64| medium::air_densities(air.0, h)
+    );
+    other!(
+        list,
+        "atmosphere::medium::air_extinction",
+        "medium::air_extinction",
+        |air: Air, amounts: [f64; 8]| medium::air_extinction(air.0, amounts)
+    );
+    other!(
+        list,
+        "atmosphere::medium::air_scattering",
+        "medium::air_scattering",
+        |air: Air, amounts: [f64; 8], weights: [f64; 8]| medium::air_scattering(
+            air.0, amounts, weights
+        )
+    );
+    other!(
+        list,
+        "atmosphere::medium::air_phases",
+        "medium::air_phases",
+        |air: Air, nu: f64| medium::air_phases(air.0, nu)
+    );
+    other!(
+        list,
+        "atmosphere::medium::peak_phase",
+        "medium::peak_phase",
+        |air: Air, nu: f64| medium::peak_phase(air.0, nu)
+    );
     same!(list, "clouds::field", "clouds", clouds, shape_coverage);
     other!(
         list,
@@ -1271,6 +1319,9 @@ fn particular(entry: Entry) -> Entry {
             )
             .energy(sky_energy)
             .weight(300.0),
+        ("atmosphere::medium", _) => entry
+            .branch("nu", &[0.999, 0.9999])
+            .branch("h", &[1e3, 2e3, 3e3, 4e3, 5e3, 1e4, 1.2e4, 2.5e4, 3e4, 4e4]),
         ("atmosphere::sun_disc", _) => entry.unit("dir").unit("to_sun"),
         ("clouds::field", "cloud_density") => entry
             .layer()

@@ -4,8 +4,8 @@ use veduta_cli::catalog::SourceArgs;
 use veduta_cli::shipped;
 use veduta_cli::stress::check::{Check, Fault, distance};
 use veduta_cli::stress::subject::Subject;
-use veduta_cli::stress::twins::{Entry, registry};
-use veduta_cli::stress::{Plan, effects, energy, functions, pairs};
+use veduta_cli::stress::twins::{ELSEWHERE, Entry, registry};
+use veduta_cli::stress::{Plan, effects, elsewhere, energy, functions, pairs};
 use veduta_compose::Library;
 use veduta_compose::header::ErrorKind;
 
@@ -66,6 +66,34 @@ fn every_public_function_has_one_twin() {
     let fewer: Vec<Subject> = subjects.into_iter().filter(|s| s.path != path).collect();
     let error = pairs(&fewer, &entries).unwrap_err().to_string();
     assert!(error.contains(path), "{error}");
+}
+
+#[test]
+fn every_function_that_reads_textures_names_its_test() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/all");
+    let tests: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| std::fs::read_to_string(entry.unwrap().path()).unwrap())
+        .collect();
+    for (path, test) in elsewhere(&library(&[]), ELSEWHERE).unwrap() {
+        let name = path.rsplit("::").next().unwrap();
+        let judged = |text: &String| text.contains(&format!("fn {test}(")) && text.contains(name);
+        assert!(tests.iter().any(judged), "no test `{test}` names `{name}`");
+    }
+    // One that no row names is an error, as is a row too many.
+    let text = "//! Looked up.\n//! source   ours\n#define_import_path veduta::looked_up\n\n/// The first texel.\n///\n/// range   [0, 1] 1\n/// error   0 abs of reference::looked_up::first\n/// source  ours\nfn first(table: texture_2d<f32>) -> vec4<f32> {\n    return textureLoad(table, vec2<i32>(0, 0), 0);\n}\n";
+    let sources = vec![("looked_up.wgsl".to_owned(), text.to_owned())];
+    let one = Library::from_sources(sources).unwrap();
+    assert!(Subject::all(&one).unwrap().is_empty());
+    let path = "veduta::looked_up::first";
+    let error = elsewhere(&one, &[]).unwrap_err().to_string();
+    assert!(error.contains(path), "{error}");
+    assert_eq!(
+        elsewhere(&one, &[(path, "a_test")]).unwrap(),
+        [(path.to_owned(), "a_test")]
+    );
+    let error = elsewhere(&one, &[(path, "a_test"), ("gone", "a_test")]).unwrap_err();
+    assert!(error.to_string().contains("gone"), "{error}");
 }
 
 #[test]

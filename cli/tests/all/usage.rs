@@ -9,7 +9,7 @@ fn help_names_every_command() {
     let dir = folder("help");
     let help = veduta(&dir, &["--help"]).good().out;
     for command in [
-        "render", "compose", "lint", "list", "bench", "cost", "stress", "diff", "eval",
+        "render", "compose", "lint", "list", "bench", "cost", "stress", "diff", "eval", "probe",
     ] {
         assert!(help.contains(command), "{help}");
         assert!(!veduta(&dir, &[command, "--help"]).good().out.is_empty());
