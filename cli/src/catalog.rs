@@ -67,6 +67,8 @@ pub struct Texts {
     pub scenes: Vec<NamedText>,
     /// Views.
     pub views: Vec<NamedText>,
+    /// Atmospheres.
+    pub atmospheres: Vec<NamedText>,
 }
 
 /// What a file is.
@@ -84,6 +86,8 @@ pub enum FileKind {
     Scene,
     /// A view.
     View,
+    /// An atmosphere.
+    Atmosphere,
 }
 
 impl Texts {
@@ -97,6 +101,7 @@ impl Texts {
             FileKind::Preset => self.presets.push((name, file, text)),
             FileKind::Scene => self.scenes.push((name, file, text)),
             FileKind::View => self.views.push((name, file, text)),
+            FileKind::Atmosphere => self.atmospheres.push((name, file, text)),
         }
     }
 
@@ -109,6 +114,7 @@ impl Texts {
             &mut self.presets,
             &mut self.scenes,
             &mut self.views,
+            &mut self.atmospheres,
         ] {
             texts.retain(|(_, name, _)| name != file);
         }
@@ -182,6 +188,7 @@ fn kind_in_presets(path: &Path) -> Option<FileKind> {
         "" => Some(FileKind::Preset),
         "scenes" => Some(FileKind::Scene),
         "views" => Some(FileKind::View),
+        "atmospheres" => Some(FileKind::Atmosphere),
         _ => None,
     }
 }

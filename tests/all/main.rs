@@ -1,6 +1,7 @@
 //! Every test of the library that runs on the device or builds something, in one binary.
 
 mod accuracy;
+mod air;
 mod atmosphere;
 mod clouds;
 mod common;

@@ -169,7 +169,7 @@ fn collect(
                 Some(kind) => found.push((kind, shown(&file), text)),
                 None if named => faults.push(Diag::whole_file(
                     shown(&file),
-                    "is neither key declarations nor a preset, a scene or a view",
+                    "is neither key declarations nor a preset, a scene, a view or an atmosphere",
                 )),
                 None => {}
             }
@@ -196,6 +196,10 @@ fn kind_of(path: &Path, ending: &str, text: &str) -> Option<FileKind> {
         Some(FileKind::Scene)
     } else if folder == Some("views") || (has("eye_height:") && has("fov_deg:")) {
         Some(FileKind::View)
+    } else if folder == Some("atmospheres")
+        || (has("planet_radius:") && has("thickness:") && has("layers:"))
+    {
+        Some(FileKind::Atmosphere)
     } else if folder == Some("presets") || (has("reason:") && has("values:")) {
         Some(FileKind::Preset)
     } else if has("name:") && has("type:") && has("kind:") && has("meaning:") {
@@ -215,6 +219,11 @@ fn check_texts(
     for (name, file, text) in &all.views {
         if let Err(found) = View::parse(name, file, text) {
             faults.append(found);
+        }
+    }
+    for (_, file, text) in &all.atmospheres {
+        if let Err(found) = veduta::Atmosphere::from_ron(text) {
+            faults.push(Diag::whole_file(file, found.to_string()));
         }
     }
     let keys = match Keys::load(&all.keys) {

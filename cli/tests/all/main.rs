@@ -9,6 +9,7 @@ mod eval;
 mod frozen;
 mod lint;
 mod list;
+mod probe;
 mod render;
 mod stress;
 mod usage;
