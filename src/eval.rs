@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 
 use veduta_compose::diag::{Diag, Diags, line_at};
 use veduta_compose::library::Library;
-use veduta_compose::link::{LinkInput, Linker};
+use veduta_compose::link::{Def, LinkInput, Linker};
 
 use crate::device::Gpu;
 use crate::error::Error;
@@ -88,6 +88,8 @@ pub struct Spec<'a> {
     pub expression: &'a str,
     /// The number of columns of a row, at most [`MAX_COLUMNS`].
     pub columns: usize,
+    /// Flags that are on in the modules.
+    pub features: &'a [&'a str],
 }
 
 /// A compiled expression.
@@ -278,7 +280,11 @@ impl Evaluator {
             });
         }
         let mut linker = Linker::new(library);
-        let defs = BTreeMap::new();
+        let defs = spec
+            .features
+            .iter()
+            .map(|flag| ((*flag).to_owned(), Def::Flag))
+            .collect();
         let mut link = |source: &Source<'_>| {
             linker
                 .link(&LinkInput {

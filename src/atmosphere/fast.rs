@@ -6,17 +6,8 @@ use crate::error::Error;
 use crate::program::ProgramSet;
 
 use super::Atmosphere;
-use super::ray::ProbeRay;
+use super::probe::{ProbeLight, ProbeRay};
 use super::tables::{Eye, SkyQuality, SkyTables, bind_groups, compute};
-
-/// Light along a ray, in red, green and blue.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RayLight {
-    /// Radiance scattered into the ray under a point sun of irradiance 1 [1/sr].
-    pub in_scatter: [f32; 3],
-    /// Transmittance to the end of the ray.
-    pub transmittance: [f32; 3],
-}
 
 /// Reads the light along rays from the tables of their eyes.
 #[derive(Debug)]
@@ -31,7 +22,8 @@ const RESULT: usize = 32;
 const WORKGROUP: u32 = 64;
 
 impl FastProbe {
-    /// Builds the pipelines.
+    /// Builds the pipelines. With `march` above 0, in [1, 256], every ray is marched with so many steps a stretch through the tables of
+    /// the air alone; with 0 the tables of the eye are read.
     ///
     /// # Errors
     /// As [`SkyTables::new`].
@@ -40,9 +32,16 @@ impl FastProbe {
         programs: &ProgramSet,
         atmosphere: &Atmosphere,
         quality: &SkyQuality,
+        march: u32,
     ) -> Result<FastProbe, Error> {
         let tables = SkyTables::new(device, programs, atmosphere, quality)?;
-        let (pipeline, layouts) = compute(device, programs, "sky_probe", &[])?;
+        let (pipeline, layouts) = compute(
+            device,
+            programs,
+            atmosphere,
+            "sky_probe",
+            &[("PROBE_MARCH", f64::from(march.min(256)))],
+        )?;
         Ok(FastProbe {
             tables,
             pipeline,
@@ -60,14 +59,14 @@ impl FastProbe {
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         rays: &[ProbeRay],
-    ) -> Result<Vec<RayLight>, Error> {
+    ) -> Result<Vec<ProbeLight>, Error> {
         let mut groups: BTreeMap<(u64, u64), Vec<usize>> = BTreeMap::new();
         for (i, ray) in rays.iter().enumerate() {
             let key = (ray.altitude.to_bits(), ray.to_sun[1].to_bits());
             groups.entry(key).or_default().push(i);
         }
         let mut results = vec![
-            RayLight {
+            ProbeLight {
                 in_scatter: [0.0; 3],
                 transmittance: [1.0; 3]
             };
@@ -110,7 +109,7 @@ impl FastProbe {
         queue: &wgpu::Queue,
         eye: &Eye,
         rays: &[u8],
-    ) -> Result<Vec<RayLight>, Error> {
+    ) -> Result<Vec<ProbeLight>, Error> {
         let count = rays.len() / RAY;
         let size = (count * RESULT) as u64;
         let buffer = |label, size, usage| {
@@ -149,6 +148,8 @@ impl FastProbe {
                     (2, view(tables.aerial())),
                     (3, view(tables.aerial_depths())),
                     (4, input.as_entire_binding()),
+                    (5, view(tables.columns())),
+                    (6, view(tables.diffuse())),
                 ],
                 &[(0, output.as_entire_binding())],
             ],
@@ -182,7 +183,7 @@ impl FastProbe {
         };
         Ok(data
             .chunks_exact(RESULT)
-            .map(|result| RayLight {
+            .map(|result| ProbeLight {
                 in_scatter: three(result, 0),
                 transmittance: three(result, 16),
             })

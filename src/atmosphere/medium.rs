@@ -523,6 +523,15 @@ impl Atmosphere {
         Ok(words)
     }
 
+    /// The flags that the programs of the atmosphere need for this air.
+    pub fn features(&self) -> &'static [&'static str] {
+        if self.lanes().len() > 4 {
+            &["AIR_EIGHT_LANES"]
+        } else {
+            &[]
+        }
+    }
+
     /// What the table of columns depends on: radius, thickness and profiles, as bytes to compare.
     pub(crate) fn profile_bytes(&self) -> Vec<u8> {
         let profiles = self.lanes().into_iter().flat_map(|lane| lane.profile.ramps());

@@ -9,7 +9,7 @@ pub mod probe;
 pub mod ray;
 mod tables;
 
-pub use fast::{FastProbe, RayLight};
+pub use fast::FastProbe;
 pub use medium::{
     AIR_WORDS, Atmosphere, Lane, Layer, Lobe, MOST_LANES, Phase, Profile, Sun,
     cornette_shanks_asymmetry,

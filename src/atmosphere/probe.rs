@@ -2,7 +2,9 @@
 
 use super::check::{fault, within};
 use super::medium::Atmosphere;
+use super::fast::FastProbe;
 use super::ray::AirRay;
+use super::tables::SkyQuality;
 use crate::device::Gpu;
 use crate::error::Error;
 use crate::program::{PipelineOptions, ProgramSet};
@@ -83,10 +85,12 @@ impl ProbeRay {
 /// Choices that are made once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ProbeOptions {
-    /// How the light is found; only by marching as yet.
+    /// How the light is found.
     pub path: ProbePath,
-    /// Which light is counted; only what is scattered once as yet.
+    /// Which light is counted.
     pub orders: Orders,
+    /// How finely the tables of the path `Fast` are made.
+    pub quality: SkyQuality,
     /// Steps along each stretch of a ray, at least 1; a step has two samples.
     pub steps: u32,
     /// Steps towards the sun at every sample, at least 1. Three stretches' rounds of all loops must stay below 65,535, where
@@ -100,6 +104,7 @@ impl Default for ProbeOptions {
         ProbeOptions {
             path: ProbePath::Textbook,
             orders: Orders::Single,
+            quality: SkyQuality::finest(),
             steps: 96,
             light_steps: 24,
         }
@@ -190,14 +195,6 @@ impl Probe {
         options: &ProbeOptions,
     ) -> Result<Probe, Error> {
         let bytes = atmosphere.air_bytes()?;
-        if options.path != ProbePath::Textbook {
-            return Err(Error::NotYet("the path `fast` of probes".to_owned()));
-        }
-        if options.orders != Orders::Single {
-            return Err(Error::NotYet(
-                "light of more than one order on the path `textbook`".to_owned(),
-            ));
-        }
         let (steps, light_steps) = (u64::from(options.steps), u64::from(options.light_steps));
         for (name, count) in [("steps", steps), ("light_steps", light_steps)] {
             if !(1..=4096).contains(&count) {
@@ -212,7 +209,7 @@ impl Probe {
                 "so few that 3 steps (2 light_steps + 1) stay below 65,535",
             ));
         }
-        let program = programs.get("probe", &[])?;
+        let program = programs.get("probe", atmosphere.features())?;
         let ready = program.pipeline(
             device,
             &PipelineOptions {
@@ -369,28 +366,31 @@ impl Probe {
     }
 }
 
-/// The light along rays, on the device, with the counts of [`ProbeOptions::default`]. For more than one batch of rays keep a
-/// [`Probe`].
+/// The light along rays, on the device: straight from the sun along the path `Textbook` by marching to the sun from every sample; of all
+/// orders along it by marching through the finest tables of the air; along the path `Fast` from the tables of each ray's eye. For more than one
+/// batch of rays keep a [`Probe`] or a [`FastProbe`].
 ///
 /// # Errors
-/// As [`Probe::new`] and [`Probe::run`].
+/// As [`Probe::new`], [`FastProbe::new`] and their `run`.
 pub fn probe(
     gpu: &Gpu,
     atmosphere: &Atmosphere,
     rays: &[ProbeRay],
-    path: ProbePath,
-    orders: Orders,
+    options: &ProbeOptions,
 ) -> Result<Vec<ProbeLight>, Error> {
-    let options = ProbeOptions {
-        path,
-        orders,
-        ..Default::default()
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    let programs = crate::programs::programs();
+    let all_orders = options.orders == Orders::All;
+    let (quality, march) = match (options.path, options.orders) {
+        (ProbePath::Textbook, Orders::Single) => {
+            return Probe::new(device, programs, atmosphere, options)?.run(device, queue, rays);
+        }
+        (ProbePath::Textbook, Orders::All) => (SkyQuality::finest(), 64),
+        (ProbePath::Fast, _) => (options.quality, 0),
     };
-    Probe::new(
-        &gpu.device,
-        crate::programs::programs(),
-        atmosphere,
-        &options,
-    )?
-    .run(&gpu.device, &gpu.queue, rays)
+    let quality = SkyQuality {
+        all_orders,
+        ..quality
+    };
+    FastProbe::new(device, programs, atmosphere, &quality, march)?.run(device, queue, rays)
 }

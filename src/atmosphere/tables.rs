@@ -45,6 +45,20 @@ impl SkyQuality {
         }
     }
 
+    /// Fine enough that refining further changes nothing that a picture shows.
+    pub fn finest() -> SkyQuality {
+        SkyQuality {
+            columns: [256, 64],
+            diffuse: [96, 32],
+            sky: [64, 256],
+            sky_steps: 32,
+            aerial: [48, 128],
+            aerial_slices: 64,
+            aerial_steps: 4,
+            all_orders: true,
+        }
+    }
+
     /// Checks every field.
     ///
     /// # Errors
@@ -223,13 +237,14 @@ pub(super) fn bind_groups(
 pub(super) fn compute(
     device: &wgpu::Device,
     programs: &ProgramSet,
+    atmosphere: &Atmosphere,
     name: &str,
     constants: &[(&str, f64)],
 ) -> Result<(wgpu::ComputePipeline, Vec<wgpu::BindGroupLayout>), Error> {
     let ReadyPipeline {
         pipeline,
         bind_group_layouts,
-    } = programs.get(name, &[])?.pipeline(
+    } = programs.get(name, atmosphere.features())?.pipeline(
         device,
         &PipelineOptions {
             constants,
@@ -340,7 +355,7 @@ impl SkyTables {
         }
         let groups_of = |size: [u32; 2], of: [u32; 2]| [size[0].div_ceil(of[0]), size[1].div_ceil(of[1])];
 
-        let (pipeline, layouts) = compute(device, programs, "air_columns", &[])?;
+        let (pipeline, layouts) = compute(device, programs, atmosphere, "air_columns", &[])?;
         let bake_columns = Bake {
             pipeline,
             groups: bind_groups(
@@ -354,10 +369,7 @@ impl SkyTables {
         let mut bake_moments = Vec::new();
         // The first order reads no other; the others read the one before, the third both. What is not read is any table but the one written.
         for (order, [before, earlier, written]) in [(1, [1, 2, 0]), (2, [0, 2, 1]), (3, [1, 0, 2])] {
-            let (pipeline, layouts) = compute(
-                device,
-                programs,
-                "air_diffuse",
+            let (pipeline, layouts) = compute(device, programs, atmosphere, "air_diffuse",
                 &[("SCATTERING_ORDER", f64::from(order))],
             )?;
             bake_moments.push(Bake {
@@ -381,10 +393,7 @@ impl SkyTables {
             });
         }
         let all = f64::from(u8::from(quality.all_orders));
-        let (pipeline, layouts) = compute(
-            device,
-            programs,
-            "sky_view",
+        let (pipeline, layouts) = compute(device, programs, atmosphere, "sky_view",
             &[
                 ("SKY_STEPS", f64::from(quality.sky_steps)),
                 ("ALL_ORDERS", all),
@@ -405,10 +414,7 @@ impl SkyTables {
             ),
             workgroups: groups_of(quality.sky, [8, 8]),
         };
-        let (pipeline, layouts) = compute(
-            device,
-            programs,
-            "sky_aerial",
+        let (pipeline, layouts) = compute(device, programs, atmosphere, "sky_aerial",
             &[
                 ("AERIAL_STEPS", f64::from(quality.aerial_steps)),
                 ("ALL_ORDERS", all),
@@ -465,9 +471,17 @@ impl SkyTables {
     /// Changes the air; the next [`SkyTables::prepare`] makes anew what depends on the change.
     ///
     /// # Errors
-    /// As [`Atmosphere::check`].
+    /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for an air that needs other programs: one with more than four lobes instead
+    /// of one with at most four, or the other way round.
     pub fn set_atmosphere(&mut self, atmosphere: &Atmosphere) -> Result<(), Error> {
         atmosphere.check()?;
+        if atmosphere.features() != self.atmosphere.features() {
+            return Err(Error::OutOfDomain {
+                name: "atmosphere.layers".to_owned(),
+                value: format!("{} lobes", atmosphere.lanes().len()),
+                domain: "on the same side of four lobes as before; other air needs tables of its own".to_owned(),
+            });
+        }
         self.atmosphere = atmosphere.clone();
         Ok(())
     }

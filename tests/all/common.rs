@@ -29,8 +29,7 @@ pub fn evaluator(imports: &[&str], prelude: &str, expression: &str, columns: usi
         prelude,
         prelude_file: "",
         expression,
-        columns,
-    };
+        columns, features: &["AIR_EIGHT_LANES"], };
     match Evaluator::new(gpu(), &modules(), &spec) {
         Ok(e) => e,
         Err(e) => panic!("{e}"),

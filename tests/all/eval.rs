@@ -39,8 +39,7 @@ fn faults_have_the_callers_places() {
             prelude,
             prelude_file: "pre.wgsl",
             expression,
-            columns: 1,
-        };
+            columns: 1, features: &[], };
         match Evaluator::new(gpu(), &modules(), &spec) {
             Ok(_) => "no fault".to_owned(),
             Err(error) => error.to_string(),

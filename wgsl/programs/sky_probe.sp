@@ -8,6 +8,10 @@ Light along given rays of one eye, read from its tables. Nothing is drawn.
 #import veduta::atmosphere::ray::{air_ray}
 #import veduta::atmosphere::sky_view::{SkyEye, sky_place, sky_radiance}
 #import veduta::atmosphere::aerial::{aerial_light}
+#import veduta::atmosphere::scatter::{scatter_along, scattered_radiance}
+
+// Steps of a march along every ray through the tables of the air alone; 0: the tables of the eye are read.
+override PROBE_MARCH: i32 = 0;
 
 struct EyeRay {
     dir: vec3<f32>,
@@ -26,6 +30,8 @@ struct ProbeLight {
 @group(1) @binding(2) var light: texture_2d_array<f32>;
 @group(1) @binding(3) var depths: texture_2d<f32>;
 @group(1) @binding(4) var<storage, read> rays: array<EyeRay>;
+@group(1) @binding(5) var columns: texture_2d_array<f32>;
+@group(1) @binding(6) var moments: texture_2d_array<f32>;
 @group(2) @binding(0) var<storage, read_write> results: array<ProbeLight>;
 
 @compute @workgroup_size(64)
@@ -37,6 +43,12 @@ fn probe(@builtin(global_invocation_id) id: vec3<u32>) {
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
     if ray.length <= 0.0 || rays[id.x].distance <= ray.from_eye {
         results[id.x] = ProbeLight(vec3<f32>(0.0), vec3<f32>(1.0));
+        return;
+    }
+    if PROBE_MARCH > 0 {
+        let short = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, rays[id.x].distance);
+        let marched = scatter_along(columns, moments, linear, air, short, eye.sun_angular_radius, true, PROBE_MARCH);
+        results[id.x] = ProbeLight(scattered_radiance(air, marched, ray.nu), marched.transmittance);
         return;
     }
     let t = rays[id.x].distance - ray.from_eye;

@@ -92,8 +92,7 @@ impl Gauge {
                     prelude: LOOPS,
                     prelude_file: "",
                     expression,
-                    columns: 1,
-                },
+                    columns: 1, features: &[], },
             )
         };
         Ok(Gauge {

@@ -113,8 +113,7 @@ pub fn run(
                     prelude: &prelude,
                     prelude_file: "",
                     expression: "repeat(in.i[0])",
-                    columns: 1,
-                },
+                    columns: 1, features: &[], },
             )?)
         })
         .collect::<Result<Vec<_>, CliError>>()?;

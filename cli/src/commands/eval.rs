@@ -60,8 +60,7 @@ pub fn run(args: &EvalArgs) -> Result<(), CliError> {
             prelude: &prelude,
             prelude_file: &prelude_file,
             expression: &args.expression,
-            columns: columns.len(),
-        },
+            columns: columns.len(), features: &[], },
     )?;
     let results = evaluator.run_bits(&rows)?;
     write_results(&args.output, &results, evaluator.width(), evaluator.kind())

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use veduta::Atmosphere;
-use veduta::atmosphere::{Orders, ProbePath, ProbeRay, probe};
+use veduta::atmosphere::{Orders, ProbeOptions, ProbePath, ProbeRay, SkyQuality, probe};
+use veduta::{Preset, Settings};
 use veduta::eval::ResultKind;
 use veduta::reference;
 
@@ -64,6 +65,9 @@ pub struct SkyArgs {
     /// Which light is counted
     #[arg(long, value_enum, default_value = "all")]
     pub orders: Which,
+    /// The preset whose tables the path `fast` uses
+    #[arg(long, value_name = "NAME", default_value = "high")]
+    pub preset: String,
     /// Random paths a ray and channel of the reference, 2 to 1e9
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1_000_000_000), default_value = "4096")]
     pub samples: u32,
@@ -147,7 +151,15 @@ fn sky(args: &SkyArgs) -> Result<(), CliError> {
     };
     let mut light: Vec<u32> = Vec::with_capacity(6 * rays.len());
     if let Some(path) = path {
-        for found in probe(veduta::device::shared()?, &air, &rays, path, orders)? {
+        let preset = Preset::Named(args.preset.clone().into());
+        let settings = Settings::resolve(veduta::programs(), &preset, None, &[])?;
+        let options = ProbeOptions {
+            path,
+            orders,
+            quality: SkyQuality::of(&settings),
+            ..Default::default()
+        };
+        for found in probe(veduta::device::shared()?, &air, &rays, &options)? {
             light.extend(found.in_scatter.map(f32::to_bits));
             light.extend(found.transmittance.map(f32::to_bits));
         }

@@ -345,8 +345,7 @@ impl Subject {
                         ),
                         prelude_file: "",
                         expression: &format!("stress_bits({})", self.call),
-                        columns: self.columns(),
-                    },
+                        columns: self.columns(), features: &["AIR_EIGHT_LANES"], },
                 )?;
                 Ok((evaluator, width))
             })

@@ -357,8 +357,7 @@ fn the_ground_is_where_the_device_draws_it() {
             prelude: "",
             prelude_file: "",
             expression: "height(Terrain(vec2<i32>(in.i[0], in.i[1]), vec2<f32>(in.f[2], in.f[3]), 8192.0, 1400.0, 1.0, 2.0, 0.0, 1u), vec2<f32>(0.0), 10)",
-            columns: 4,
-        },
+            columns: 4, features: &[], },
     )
     .unwrap();
     let places = [[0.0, 0.0], [-3e3, 12_345.6], [4e7, -3e7], [1e12, 7.0]];
