@@ -5,7 +5,6 @@
 //! as `i32`, `u32` or `f32`. The result is a scalar or a vector and comes back bit by bit, so that a NaN stays what it
 //! was.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use veduta_compose::diag::{Diag, Diags, line_at};

@@ -173,7 +173,10 @@ impl FastProbe {
         device
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|e| lost(&e))?;
-        receiver.recv().map_err(|e| lost(&e))?.map_err(|e| lost(&e))?;
+        receiver
+            .recv()
+            .map_err(|e| lost(&e))?
+            .map_err(|e| lost(&e))?;
         let data = staging.slice(..).get_mapped_range().map_err(|e| lost(&e))?;
         let three = |result: &[u8], at: usize| {
             [0, 4, 8].map(|k| {

@@ -534,7 +534,10 @@ impl Atmosphere {
 
     /// What the table of columns depends on: radius, thickness and profiles, as bytes to compare.
     pub(crate) fn profile_bytes(&self) -> Vec<u8> {
-        let profiles = self.lanes().into_iter().flat_map(|lane| lane.profile.ramps());
+        let profiles = self
+            .lanes()
+            .into_iter()
+            .flat_map(|lane| lane.profile.ramps());
         [self.planet_radius, self.thickness]
             .into_iter()
             .chain(profiles)

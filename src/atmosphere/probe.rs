@@ -1,8 +1,8 @@
 //! Radiance and transmittance along given rays: a query, not a part of a frame.
 
 use super::check::{fault, within};
-use super::medium::Atmosphere;
 use super::fast::FastProbe;
+use super::medium::Atmosphere;
 use super::ray::AirRay;
 use super::tables::SkyQuality;
 use crate::device::Gpu;

@@ -147,7 +147,12 @@ struct Table {
 }
 
 impl Table {
-    fn new(device: &wgpu::Device, label: &str, [width, height]: [u32; 2], layers: Option<u32>) -> Table {
+    fn new(
+        device: &wgpu::Device,
+        label: &str,
+        [width, height]: [u32; 2],
+        layers: Option<u32>,
+    ) -> Table {
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
             size: wgpu::Extent3d {
@@ -333,7 +338,7 @@ impl SkyTables {
         // A second layer for lanes 4 to 7 is there in any case: eight lanes are a matter of content.
         let columns = Table::new(device, "veduta columns", quality.columns, Some(2));
         let moments =
-            [1, 2, 3].map(|_| Table::new(device, "veduta diffuse light", quality.diffuse, Some(2)));
+            [1, 2, 3].map(|_| Table::new(device, "veduta diffuse light", quality.diffuse, Some(3)));
         let sky = Table::new(device, "veduta sky", quality.sky, Some(2));
         let aerial = Table::new(
             device,
@@ -353,7 +358,8 @@ impl SkyTables {
         fn at(binding: u32, table: &Table) -> (u32, wgpu::BindingResource<'_>) {
             (binding, wgpu::BindingResource::TextureView(&table.view))
         }
-        let groups_of = |size: [u32; 2], of: [u32; 2]| [size[0].div_ceil(of[0]), size[1].div_ceil(of[1])];
+        let groups_of =
+            |size: [u32; 2], of: [u32; 2]| [size[0].div_ceil(of[0]), size[1].div_ceil(of[1])];
 
         let (pipeline, layouts) = compute(device, programs, atmosphere, "air_columns", &[])?;
         let bake_columns = Bake {
@@ -368,8 +374,13 @@ impl SkyTables {
         };
         let mut bake_moments = Vec::new();
         // The first order reads no other; the others read the one before, the third both. What is not read is any table but the one written.
-        for (order, [before, earlier, written]) in [(1, [1, 2, 0]), (2, [0, 2, 1]), (3, [1, 0, 2])] {
-            let (pipeline, layouts) = compute(device, programs, atmosphere, "air_diffuse",
+        for (order, [before, earlier, written]) in [(1, [1, 2, 0]), (2, [0, 2, 1]), (3, [1, 0, 2])]
+        {
+            let (pipeline, layouts) = compute(
+                device,
+                programs,
+                atmosphere,
+                "air_diffuse",
                 &[("SCATTERING_ORDER", f64::from(order))],
             )?;
             bake_moments.push(Bake {
@@ -393,7 +404,11 @@ impl SkyTables {
             });
         }
         let all = f64::from(u8::from(quality.all_orders));
-        let (pipeline, layouts) = compute(device, programs, atmosphere, "sky_view",
+        let (pipeline, layouts) = compute(
+            device,
+            programs,
+            atmosphere,
+            "sky_view",
             &[
                 ("SKY_STEPS", f64::from(quality.sky_steps)),
                 ("ALL_ORDERS", all),
@@ -414,7 +429,11 @@ impl SkyTables {
             ),
             workgroups: groups_of(quality.sky, [8, 8]),
         };
-        let (pipeline, layouts) = compute(device, programs, atmosphere, "sky_aerial",
+        let (pipeline, layouts) = compute(
+            device,
+            programs,
+            atmosphere,
+            "sky_aerial",
             &[
                 ("AERIAL_STEPS", f64::from(quality.aerial_steps)),
                 ("ALL_ORDERS", all),
@@ -479,7 +498,9 @@ impl SkyTables {
             return Err(Error::OutOfDomain {
                 name: "atmosphere.layers".to_owned(),
                 value: format!("{} lobes", atmosphere.lanes().len()),
-                domain: "on the same side of four lobes as before; other air needs tables of its own".to_owned(),
+                domain:
+                    "on the same side of four lobes as before; other air needs tables of its own"
+                        .to_owned(),
             });
         }
         self.atmosphere = atmosphere.clone();
@@ -631,7 +652,8 @@ fn table_scale(atmosphere: &Atmosphere, altitude: f64, sun_mu: f64) -> f32 {
     let mut brightest = 0.0_f64;
     for step in -8..=8 {
         // As far as an eye on the ground, or one above the limb, may see.
-        let reach = (radius / (radius + altitude.max(1.0))).acos() + (radius / (radius + top)).acos();
+        let reach =
+            (radius / (radius + altitude.max(1.0))).acos() + (radius / (radius + top)).acos();
         let angle = reach * f64::from(step) / 8.0;
         let there_mu = sun_mu * angle.cos() + sun_sine * angle.sin();
         for level in 0..12 {

@@ -5,8 +5,9 @@ use std::f64::consts::PI;
 
 use crate::common::gpu;
 use veduta::atmosphere::{
-    AIR_WORDS, Aerosol, Atmosphere, Layer, Lobe, MOST_LANES, Molecules, Orders, Phase, ProbeOptions, ProbePath,
-    ProbeRay, Profile, aerosol_scattering, cornette_shanks_asymmetry, probe, rayleigh_scattering,
+    AIR_WORDS, Aerosol, Atmosphere, Layer, Lobe, MOST_LANES, Molecules, Orders, Phase,
+    ProbeOptions, ProbePath, ProbeRay, Profile, aerosol_scattering, cornette_shanks_asymmetry,
+    probe, rayleigh_scattering,
 };
 use veduta::reference::probe::{Effort, probe as reference};
 use veduta::reference::quadrature::Rule;

@@ -29,7 +29,9 @@ pub fn evaluator(imports: &[&str], prelude: &str, expression: &str, columns: usi
         prelude,
         prelude_file: "",
         expression,
-        columns, features: &["AIR_EIGHT_LANES"], };
+        columns,
+        features: &["AIR_EIGHT_LANES"],
+    };
     match Evaluator::new(gpu(), &modules(), &spec) {
         Ok(e) => e,
         Err(e) => panic!("{e}"),

@@ -39,7 +39,9 @@ fn faults_have_the_callers_places() {
             prelude,
             prelude_file: "pre.wgsl",
             expression,
-            columns: 1, features: &[], };
+            columns: 1,
+            features: &[],
+        };
         match Evaluator::new(gpu(), &modules(), &spec) {
             Ok(_) => "no fault".to_owned(),
             Err(error) => error.to_string(),

@@ -1,6 +1,6 @@
 //! The table of the air before things, as seen from one eye: by direction and by distance.
 //! source   Hillaire2020 (a volume per eye); in the sky's own directions, so that turning the eye costs nothing, and means over the distance, which vary little: ours
-//! symbols  t distance from the start of the ray in the air [m] · length that to the ray's end [m] · slice sqrt(t / length)
+//! symbols  t distance from the start of the ray in the air [m] · length that to the ray's end [m] · slice a coordinate in [0, 1] along it
 //!
 //! A texel of the light's table belongs to an azimuth from the sun (x), a height above or depth below the horizon (y: the lower half of the rows is above the
 //! horizon, the upper below) and a slice, and holds radiance scattered in between for a sun of irradiance 1, over the distance and times scale and thickness of the air:
@@ -24,28 +24,56 @@ fn aerial_row(y: f32, below: bool, rows: f32) -> f32 {
     return (y * (half - 1.0) + 0.5 + select(0.0, half, below)) / rows;
 }
 
-/// Distance of a slice, in [0, 1], of a ray.
+/// Where on a ray slices are dense: 0 at its start, for an eye in the lower air; of a higher eye's rays 1 at the end, when they meet the ground, and 2 in the middle.
 ///
+/// domain  eye.altitude in [0, 1e8] m lin
+/// range   [0, 2] 1
+/// error   0 abs of reference::air_tables::aerial_spacing
+/// source  ours
+fn aerial_spacing(eye: SkyEye, below: bool) -> i32 {
+    return select(0, select(2, 1, below), eye.altitude > 0.15 * eye.top);
+}
+
+/// Distance of a slice, in [0, 1], of a ray; `spacing` is 0, 1 or 2.
+///
+/// domain  spacing in [0, 2] 1 lin
 /// domain  slice in [0, 1] 1 lin
 /// domain  length in [0, 2e6] m lin
 /// range   [0, 2e6] m
-/// error   2e-7 rel of reference::air_tables::aerial_distance
+/// error   0.2 abs of reference::air_tables::aerial_distance
 /// monotone slice
-/// source  Hillaire2020 (squared slices)
-fn aerial_distance(slice: f32, length: f32) -> f32 {
+/// source  Hillaire2020 (squared slices); the others: ours
+fn aerial_distance(spacing: i32, slice: f32, length: f32) -> f32 {
+    let rest = 1.0 - slice;
+    let aside = 2.0 * slice - 1.0;
+    if spacing == 1 {
+        return length * (1.0 - rest * rest);
+    }
+    if spacing == 2 {
+        return length * (0.5 + 0.5 * aside * abs(aside));
+    }
     return length * slice * slice;
 }
 
 /// Slice of a distance: the inverse of `aerial_distance`; 1 beyond the end.
 ///
+/// domain  spacing in [0, 2] 1 lin
 /// domain  t in [0, 2e6] m lin
 /// domain  length in [1, 2e6] m log
 /// range   [0, 1] 1
-/// error   2e-7 abs of reference::air_tables::aerial_slice
+/// error   4e-4 abs of reference::air_tables::aerial_slice
 /// monotone t
 /// source  as aerial_distance
-fn aerial_slice(t: f32, length: f32) -> f32 {
-    return sqrt(clamp(t / max(length, 1e-20), 0.0, 1.0));
+fn aerial_slice(spacing: i32, t: f32, length: f32) -> f32 {
+    let share = clamp(t / max(length, 1e-20), 0.0, 1.0);
+    if spacing == 1 {
+        return 1.0 - sqrt(1.0 - share);
+    }
+    if spacing == 2 {
+        let aside = 2.0 * share - 1.0;
+        return 0.5 + 0.5 * sign(aside) * sqrt(abs(aside));
+    }
+    return sqrt(share);
 }
 
 /// Light and transmittance of the air from an eye to the distance `t` from where the ray enters the air, for the direction's place in the tables of the eye and the whole length
@@ -62,7 +90,7 @@ fn aerial_slice(t: f32, length: f32) -> f32 {
 /// source  Hillaire2020
 fn aerial_light(light: texture_2d_array<f32>, depths: texture_2d<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace, t: f32, length: f32) -> AirLight {
     let reached = clamp(t, 0.0, length);
-    let slice = aerial_slice(reached, length);
+    let slice = aerial_slice(aerial_spacing(eye, place.below), reached, length);
     let size = vec2<f32>(textureDimensions(light));
     let slices = i32(textureNumLayers(light)) / 2;
     let row = aerial_row(place.y, place.below, size.y);

@@ -8,7 +8,7 @@
 #import veduta::atmosphere::diffuse::{Moments, diffuse_moments, diffuse_source, level_irradiance}
 #import veduta::atmosphere::scatter::{step_share}
 #import veduta::planet::shell::{altitude_along, top_distance, ground_distance}
-#import veduta::math::gauss::{gauss_five}
+#import veduta::math::gauss::{gauss_four, gauss_five}
 #import veduta::math::squared::{squared_node}
 
 /// Radiance that the ground reflects where the sun's zenith cosine is `sun_mu`: of light straight from the sun, or of the light whose moments are given.
@@ -38,11 +38,16 @@ fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
     let horizon = horizon_cosine(air.ground_radius, h);
     let sun_sine = sqrt(max(1.0 - sun_mu * sun_mu, 1e-8));
     var whole = vec3<f32>(0.0);
-    var up = 0.0;
-    var more = vec4<f32>(0.0);
-    for (var i = 0; i < 10; i++) {
-        let polar = gauss_five(i % 5);
-        let below = i >= 5;
+    var up = vec3<f32>(0.0);
+    var level = vec3<f32>(0.0);
+    var aside = vec3<f32>(0.0);
+    // The first order has more detail than the others.
+    let polar_count = select(4, 5, from_sun);
+    let steps = select(6, 8, from_sun);
+    for (var i = 0; i < 2 * polar_count; i++) {
+        let below = i >= polar_count;
+        let point = select(i, i - polar_count, below);
+        let polar = select(gauss_four(point), gauss_five(point), from_sun);
         // Dense at the horizon on both of its sides.
         let span = select(1.0 - horizon, -1.0 - horizon, below);
         let mu = horizon + span * (polar.x * polar.x);
@@ -60,8 +65,8 @@ fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
             let phases = air_phases(air, nu);
             var left = vec3<f32>(1.0);
             var light = vec3<f32>(0.0);
-            for (var k = 0; k < 8; k++) {
-                let node = squared_node(8, k);
+            for (var k = 0; k < steps; k++) {
+                let node = squared_node(steps, k);
                 let t = end * node.x;
                 let distance = end * node.y;
                 let altitude = max(altitude_along(air.ground_radius, h, mu, t), 0.0);
@@ -90,15 +95,15 @@ fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
                 light += left * ground_light(columns, moments, linear, air, there_sun, from_sun);
             }
             let weighted = light * solid;
-            let mean = dot(weighted, vec3<f32>(1.0 / 3.0));
             let x = sine * cos_phi / sun_sine;
             whole += weighted;
-            up += mean * mu;
-            more += mean * vec4<f32>(x, 1.5 * mu * mu - 0.5, mu * x, sine * sine * (2.0 * cos_phi * cos_phi - 1.0) / (sun_sine * sun_sine));
+            up += weighted * mu;
+            level += weighted * (1.5 * mu * mu - 0.5);
+            aside += dot(weighted, vec3<f32>(1.0)) * vec3<f32>(x, mu * x, sine * sine * (2.0 * cos_phi * cos_phi - 1.0) / (sun_sine * sun_sine));
         }
     }
-    let over = 1.0 / max(dot(whole, vec3<f32>(1.0 / 3.0)), 1e-30);
-    return Moments(whole, up * over, more * over);
+    let over = 1.0 / max(whole, vec3<f32>(1e-30));
+    return Moments(whole, up * over, level * over, aside / max(dot(whole, vec3<f32>(1.0)), 1e-30));
 }
 
 /// Light of all orders from the third on, when `last` is the light of the third order and `before` that of the second: a geometric series, whose ratio is at most 0.95.
@@ -107,13 +112,15 @@ fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
 /// domain  last.whole in [0, 10] 1 lin
 /// domain  before.up in [-1, 1] 1 lin
 /// domain  last.up in [-1, 1] 1 lin
-/// domain  before.more in [-1, 1] 1 lin
-/// domain  last.more in [-1, 1] 1 lin
+/// domain  before.level in [-1, 1] 1 lin
+/// domain  before.aside in [-1, 1] 1 lin
+/// domain  last.level in [-1, 1] 1 lin
+/// domain  last.aside in [-1, 1] 1 lin
 /// range   [-10, 200] 1
 /// error   1e-4 rel of reference::air_tables::further_orders
 /// outside undefined
 /// source  geometric series
 fn further_orders(before: Moments, last: Moments) -> Moments {
     let ratio = clamp(last.whole / max(before.whole, vec3<f32>(1e-30)), vec3<f32>(0.0), vec3<f32>(0.95));
-    return Moments(last.whole / (1.0 - ratio), last.up, last.more);
+    return Moments(last.whole / (1.0 - ratio), last.up, last.level, last.aside);
 }

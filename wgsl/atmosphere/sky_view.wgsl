@@ -2,13 +2,15 @@
 //! source   Hillaire2020 (a table per eye); half-angle tangents, exact horizon, cosine of the azimuth: ours
 //! symbols  mu zenith cosine · x, y coordinates in [0, 1]: azimuth from the sun, and height above the horizon
 //!
+//! Of an eye within the air the table holds the directions above the horizon; those below are in the table of the air before things. Of an eye above the air the
+//! first third of the rows is the limb and the others are the globe.
+//!
 //! A texel holds radiance for a sun of irradiance 1, times the scale of the eye: layer 0 but for peaked light [1/sr], layer 1 peaked light over the peaked
 //! phase function [1].
 #define_import_path veduta::atmosphere::sky_view
 
 #import veduta::atmosphere::ray::{tangent_altitude}
 #import veduta::atmosphere::medium::{Air, peak_phase}
-#import veduta::atmosphere::columns::{texture_place}
 
 /// What the tables of one eye belong to.
 struct SkyEye {
@@ -101,7 +103,33 @@ fn sky_direction(eye: SkyEye, place: vec2<f32>, below: bool) -> vec3<f32> {
     return vec3<f32>(aside.x * sine, mu, aside.y * sine);
 }
 
-/// Radiance of the sky in a direction above the horizon, for a sun of irradiance 1 and without its disc, read from the table.
+/// How many rows of a table of the sky with `rows` rows hold directions above the horizon.
+///
+/// domain  eye.altitude in [0, 1e8] m lin
+/// domain  rows in [6, 1024] 1 log
+/// range   [2, 1024] 1
+/// error   0 abs of reference::air_tables::sky_rows
+/// source  ours
+fn sky_rows(eye: SkyEye, rows: f32) -> f32 {
+    return select(rows, floor(rows / 3.0), eye.altitude > eye.top);
+}
+
+/// Row of the table of the sky, in [0, 1], of a height above or depth below the horizon in [0, 1]; the parts never mix.
+///
+/// domain  eye.altitude in [0, 1e8] m lin
+/// domain  y in [0, 1] 1 lin
+/// domain  rows in [6, 1024] 1 log
+/// range   [0, 1] 1
+/// error   2e-7 abs of reference::air_tables::sky_row
+/// source  elementary
+fn sky_row(eye: SkyEye, y: f32, below: bool, rows: f32) -> f32 {
+    let above = sky_rows(eye, rows);
+    let first = select(0.0, above, below);
+    let count = select(above, rows - above, below);
+    return (first + y * (count - 1.0) + 0.5) / rows;
+}
+
+/// Radiance of the sky in a direction above the horizon, or of the air before the globe for an eye above the air; for a sun of irradiance 1 and without its disc, read from the table.
 ///
 /// domain  place.x in [0, 1] 1 lin
 /// domain  place.y in [0, 1] 1 lin
@@ -112,7 +140,7 @@ fn sky_direction(eye: SkyEye, place: vec2<f32>, below: bool) -> vec3<f32> {
 /// source  Hillaire2020
 fn sky_radiance(sky: texture_2d_array<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace) -> vec3<f32> {
     let size = vec2<f32>(textureDimensions(sky));
-    let at = texture_place(vec2<f32>(place.x, place.y), size);
+    let at = vec2<f32>((place.x * (size.x - 1.0) + 0.5) / size.x, sky_row(eye, place.y, place.below, size.y));
     let smooth_light = textureSampleLevel(sky, linear, at, 0, 0.0).rgb;
     let peaked = textureSampleLevel(sky, linear, at, 1, 0.0).rgb;
     return (smooth_light + peaked * peak_phase(air, place.nu)) / eye.scale;

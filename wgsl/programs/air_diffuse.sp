@@ -22,7 +22,7 @@ override SCATTERING_ORDER: i32 = 1;
 @group(2) @binding(0) var moments: texture_storage_2d_array<rgba16float, write>;
 
 fn order_at(order: texture_2d_array<f32>, texel: vec2<u32>) -> Moments {
-    return decode_moments(textureLoad(order, texel, 0, 0), textureLoad(order, texel, 1, 0));
+    return decode_moments(textureLoad(order, texel, 0, 0), textureLoad(order, texel, 1, 0), textureLoad(order, texel, 2, 0));
 }
 
 @compute @workgroup_size(4, 4)
@@ -38,7 +38,8 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
         found = add_moments(add_moments(order_at(earlier, id.xy), second), further_orders(second, found));
     }
     textureStore(moments, id.xy, 0, encode_moments(found));
-    textureStore(moments, id.xy, 1, found.more);
+    textureStore(moments, id.xy, 1, vec4<f32>(found.up, found.aside.y));
+    textureStore(moments, id.xy, 2, vec4<f32>(found.level, found.aside.z));
 }
     }#
 }#

@@ -88,7 +88,11 @@ fn background(dir: vec3<f32>) -> vec3<f32> {
         let sun_mu = clamp(((air.ground_radius + ray.altitude) * ray.sun_mu + ray.length * ray.nu) / air.ground_radius, -1.0, 1.0);
         let sun = max(sun_mu, 0.0) * exp(-sun_depth(columns, linear, air, 0.0, sun_mu)) * sun_above_horizon(air.ground_radius, 0.0, sun_mu, eye.sun_angular_radius);
         let around = level_irradiance(diffuse_moments(moments, linear, air.top, 0.0, sun_mu));
-        return front.in_scatter + front.transmittance * air.ground_albedo * (0.31830989 * (sun + around));
+        var radiance = front.in_scatter;
+        if eye.altitude > eye.top {
+            radiance = sky_radiance(sky, linear, air, eye, place);
+        }
+        return radiance + front.transmittance * air.ground_albedo * (0.31830989 * (sun + around));
     }
     var radiance = sky_radiance(sky, linear, air, eye, place);
     if place.nu > cos(eye.sun_angular_radius + draw_view.pixel_angle) {

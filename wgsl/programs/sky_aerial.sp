@@ -10,7 +10,7 @@ invocation marches one direction from the eye to its end and leaves a texel at e
 #import veduta::atmosphere::columns::{texel_coordinates}
 #import veduta::atmosphere::scatter::{split_phases, air_source, step_share}
 #import veduta::atmosphere::sky_view::{SkyEye, sky_direction}
-#import veduta::atmosphere::aerial::{aerial_distance}
+#import veduta::atmosphere::aerial::{aerial_distance, aerial_spacing}
 
 override ALL_ORDERS: i32 = 1;
 override AERIAL_STEPS: i32 = 1;
@@ -35,6 +35,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     let place = texel_coordinates(vec2<f32>(f32(id.x), f32(id.y % half)), vec2<f32>(f32(size.x), f32(half)));
     let dir = sky_direction(eye, place, below);
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
+    let spacing = aerial_spacing(eye, below);
     let phases = split_phases(air, ray.nu);
     var smooth_light = vec3<f32>(0.0);
     var peaked_light = vec3<f32>(0.0);
@@ -42,7 +43,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     var left = vec3<f32>(1.0);
     var t = 0.0;
     for (var slice = 0; slice < slices; slice++) {
-        let end = aerial_distance(f32(slice) / f32(slices - 1), ray.length);
+        let end = aerial_distance(spacing, f32(slice) / f32(slices - 1), ray.length);
         var mean_smooth = vec3<f32>(0.0);
         var mean_peaked = vec3<f32>(0.0);
         var mean_depth = vec3<f32>(0.0);

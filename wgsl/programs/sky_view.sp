@@ -8,9 +8,9 @@ The table of the sky as one eye sees it: every direction that leaves the air. Ma
 #import veduta::atmosphere::ray::{air_ray}
 #import veduta::atmosphere::columns::{texel_coordinates}
 #import veduta::atmosphere::scatter::{scatter_along}
-#import veduta::atmosphere::sky_view::{SkyEye, sky_direction}
+#import veduta::atmosphere::sky_view::{SkyEye, sky_direction, sky_rows}
 
-override SKY_STEPS: i32 = 16;
+override SKY_STEPS: i32 = 12;
 override ALL_ORDERS: i32 = 1;
 
 @group(0) @binding(0) var<uniform> air: Air;
@@ -26,8 +26,11 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= size.x || id.y >= size.y {
         return;
     }
-    let place = texel_coordinates(vec2<f32>(id.xy), vec2<f32>(size));
-    let dir = sky_direction(eye, place, false);
+    let above = sky_rows(eye, f32(size.y));
+    let below = f32(id.y) >= above;
+    let row = vec2<f32>(f32(id.y) - select(0.0, above, below), select(above, f32(size.y) - above, below));
+    let place = texel_coordinates(vec2<f32>(f32(id.x), row.x), vec2<f32>(f32(size.x), row.y));
+    let dir = sky_direction(eye, place, below);
     var ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
     let light = scatter_along(columns, moments, linear, air, ray, eye.sun_angular_radius, ALL_ORDERS != 0, SKY_STEPS);
     textureStore(sky, id.xy, 0, vec4<f32>(light.smooth_light * eye.scale, 1.0));

@@ -92,7 +92,9 @@ impl Gauge {
                     prelude: LOOPS,
                     prelude_file: "",
                     expression,
-                    columns: 1, features: &[], },
+                    columns: 1,
+                    features: &[],
+                },
             )
         };
         Ok(Gauge {

@@ -60,7 +60,9 @@ pub fn run(args: &EvalArgs) -> Result<(), CliError> {
             prelude: &prelude,
             prelude_file: &prelude_file,
             expression: &args.expression,
-            columns: columns.len(), features: &[], },
+            columns: columns.len(),
+            features: &[],
+        },
     )?;
     let results = evaluator.run_bits(&rows)?;
     write_results(&args.output, &results, evaluator.width(), evaluator.kind())

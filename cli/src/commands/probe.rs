@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use veduta::Atmosphere;
 use veduta::atmosphere::{Orders, ProbeOptions, ProbePath, ProbeRay, SkyQuality, probe};
-use veduta::{Preset, Settings};
 use veduta::eval::ResultKind;
 use veduta::reference;
+use veduta::{Preset, Settings};
 
 use crate::error::CliError;
 use crate::image::check_folder;

@@ -345,7 +345,9 @@ impl Subject {
                         ),
                         prelude_file: "",
                         expression: &format!("stress_bits({})", self.call),
-                        columns: self.columns(), features: &["AIR_EIGHT_LANES"], },
+                        columns: self.columns(),
+                        features: &["AIR_EIGHT_LANES"],
+                    },
                 )?;
                 Ok((evaluator, width))
             })
