@@ -70,7 +70,7 @@ pub enum Profile {
     Tent {
         /// Where it begins, in [-1e7, 1e7] m.
         bottom: f64,
-        /// Where it is densest, at least 1 m above the bottom [m].
+        /// Where it is densest, at least 1 m above the bottom (m).
         peak: f64,
         /// Where it ends, at least 1 m above the peak, in [-1e7, 1e7] m.
         top: f64,
@@ -135,9 +135,9 @@ pub struct Lobe {
     pub g: f64,
     /// Square over level: Draine's alpha.
     pub alpha: f64,
-    /// Level [1/sr].
+    /// Level (1/sr).
     pub level: f64,
-    /// Coefficient of nu^2 [1/sr].
+    /// Coefficient of nu^2 (1/sr).
     pub square: f64,
     /// First Legendre moment.
     pub first: f64,
@@ -162,7 +162,7 @@ impl Lobe {
         }
     }
 
-    /// Its value for a cosine of the scattering angle, weight left out [1/sr].
+    /// Its value for a cosine of the scattering angle, weight left out (1/sr).
     pub fn value(&self, nu: f64) -> f64 {
         let base = (1.0 - self.g).powi(2) + 2.0 * self.g * (1.0 - nu);
         (self.level + self.square * nu * nu) / (base * base.sqrt())
@@ -204,7 +204,7 @@ impl Phase {
         lobes
     }
 
-    /// Its value for a cosine of the scattering angle, 1 forward [1/sr].
+    /// Its value for a cosine of the scattering angle, 1 forward (1/sr).
     pub fn value(&self, nu: f64) -> f64 {
         self.lobes().iter().map(|l| l.weight * l.value(nu)).sum()
     }
@@ -231,9 +231,9 @@ impl Profile {
 pub struct Lane {
     /// Density with altitude; lobes of one layer have the same.
     pub profile: Profile,
-    /// Extinction at density 1 [1/m]. The first lane of a layer has that of the whole layer, the others have none.
+    /// Extinction at density 1 (1/m). The first lane of a layer has that of the whole layer, the others have none.
     pub extinction: [f64; 3],
-    /// Scattering into this lobe at density 1 [1/m].
+    /// Scattering into this lobe at density 1 (1/m).
     pub scattering: [f64; 3],
     /// The lobe, with the weight 1; `None` for a layer that does not scatter.
     pub lobe: Option<Lobe>,
@@ -304,7 +304,7 @@ impl Default for Sun {
 }
 
 impl Profile {
-    /// Altitudes [m] between which the density is smooth.
+    /// Altitudes (m) between which the density is smooth.
     pub fn bends(&self) -> Vec<f64> {
         match *self {
             Profile::Exponential { .. } => vec![],
@@ -466,7 +466,7 @@ impl Atmosphere {
         Ok(())
     }
 
-    /// Altitude of the top of the air plus the radius of the ground [m].
+    /// Altitude of the top of the air plus the radius of the ground (m).
     pub fn top_radius(&self) -> f64 {
         self.planet_radius + self.thickness
     }

@@ -7,10 +7,10 @@ use super::check::{each_within, within};
 use super::medium::{Layer, Phase, Profile};
 use crate::error::Error;
 
-/// Scattering of a gas [1/m] for light of a `wavelength` in vacuum [m].
+/// Scattering of a gas (1/m) for light of a `wavelength` in vacuum (m).
 ///
 /// 8 pi^3 / 3 (n^2 - 1)^2 / (N l^4) (6 + 3 p) / (6 - 7 p), where n is the `refractive_index`, N the `number_density`
-/// [1/m^3], both at the same pressure, and p the `depolarisation` of scattered light [1] (Preetham, Shirley and Smits
+/// (1/m^3), both at the same pressure, and p the `depolarisation` of scattered light (Preetham, Shirley and Smits
 /// 1999). Its phase function is Rayleigh's.
 ///
 /// With n = 1.0003, N = 2.545e25 and p = 0.035 it is 1.24109e-30 m^3 / l^4: the air that computer graphics calls the
@@ -27,14 +27,14 @@ pub fn rayleigh_scattering(
     8.0 * PI.powi(3) / 3.0 * excess * excess / (number_density * wavelength.powi(4)) * king
 }
 
-/// Concentration factor of aerosol [m], 0 where the fit falls below: (0.6544 T - 0.6510) 1e-18. The 1e-16 that is often
+/// Concentration factor of aerosol (m), 0 where the fit falls below: (0.6544 T - 0.6510) 1e-18. The 1e-16 that is often
 /// printed is for centimetres.
 fn concentration(turbidity: f64) -> f64 {
     ((0.6544 * turbidity - 0.6510) * 1e-18).max(0.0)
 }
 
-/// Scattering of haze [1/m] of a `turbidity` (1 is pure air, 2 a clear day, 10 thick haze) for light of a `wavelength`
-/// [m]: 0.434 c pi (2 pi / l)^2 K, with K = `k` about 0.67 [1] (Preetham, Shirley and Smits 1999, with c in metres).
+/// Scattering of haze (1/m) of a `turbidity` (1 is pure air, 2 a clear day, 10 thick haze) for light of a `wavelength`
+/// (m): 0.434 c pi (2 pi / l)^2 K, with K = `k` about 0.67 (Preetham, Shirley and Smits 1999, with c in metres).
 ///
 /// The turbidity comes out as the ratio of the whole optical depth to that of the molecules at 550 nm only with a scale
 /// height of about 1250 m.

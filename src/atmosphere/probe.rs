@@ -12,20 +12,20 @@ use crate::program::{PipelineOptions, ProgramSet};
 /// A ray whose light is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProbeRay {
-    /// Altitude of the eye [m], at least 0.
+    /// Altitude of the eye (m), at least 0.
     pub altitude: f64,
     /// Direction of the view, a unit vector in the frame of the eye, y up.
     pub dir: [f64; 3],
     /// Direction to the sun, a unit vector in the same frame.
     pub to_sun: [f64; 3],
-    /// Where the ray ends [m], if not at the ground or the top of the air before; above 0, may be infinite.
+    /// Where the ray ends (m), if not at the ground or the top of the air before; above 0, may be infinite.
     pub distance: f64,
 }
 
 /// The light along a ray, for a point of a sun whose irradiance outside the air is 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProbeLight {
-    /// Radiance scattered into the ray [1/sr], without that of the ground at its end. 0 for a ray that misses the air.
+    /// Radiance scattered into the ray (1/sr), without that of the ground at its end. 0 for a ray that misses the air.
     pub in_scatter: [f32; 3],
     /// Transmittance to the end of the ray. 1 for a ray that misses the air.
     pub transmittance: [f32; 3],

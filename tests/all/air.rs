@@ -556,8 +556,10 @@ fn empty_and_black_air_give_nothing() {
 
 /// Eight lobes, a step and two phase functions of two lobes.
 fn full() -> Atmosphere {
-    let mut air = Atmosphere::default();
-    air.ground_albedo = [0.1, 0.2, 0.3];
+    let mut air = Atmosphere {
+        ground_albedo: [0.1, 0.2, 0.3],
+        ..Atmosphere::default()
+    };
     air.layers[1].phase = Phase::TwoLobes {
         forward: 0.85,
         backward: -0.35,

@@ -157,8 +157,8 @@ fn four_phases(layers: FourLayers, nu: f32) -> vec4<f32> {
 /// Phase functions of all layers; their integrals over the sphere are 1.
 ///
 /// domain  nu in [-1, 1] 1 lin
-/// range   [0, 1e6] 1/sr
-/// error   2e-4 rel of reference::medium::air_phases
+/// range   [0, 2e3] 1/sr
+/// error   2e-5 rel of reference::medium::air_phases
 /// outside undefined
 /// source  Cornette1992, Henyey1941, Draine2003 in one form
 fn air_phases(air: Air, nu: f32) -> Lanes {
@@ -172,8 +172,8 @@ fn air_phases(air: Air, nu: f32) -> Lanes {
 /// The phase function that the light of peaked layers is kept without in tables: that of the most peaked layer.
 ///
 /// domain  nu in [-1, 1] 1 lin
-/// range   [0, 1e6] 1/sr
-/// error   2e-4 rel of reference::medium::peak_phase
+/// range   [0, 2e3] 1/sr
+/// error   2e-5 rel of reference::medium::peak_phase
 /// outside undefined
 /// source  as air_phases
 fn peak_phase(air: Air, nu: f32) -> f32 {

@@ -34,7 +34,7 @@ fn eight() -> Atmosphere {
                 exponential(900.0),
                 3e-5,
                 1e-5,
-                Phase::CornetteShanks { g: 0.95 },
+                Phase::CornetteShanks { g: 0.99 },
             ),
             layer("c", tent(-1e3, 0.0, 3e3), 1e-5, 1e-5, Phase::Isotropic),
             layer("d", tent(1e4, 1.2e4, 3e4), 0.0, 2e-6, Phase::Isotropic),
