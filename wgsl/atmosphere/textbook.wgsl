@@ -74,8 +74,8 @@ fn march_sun_depth(air: Air, h: f32, sun_mu: f32, steps: i32) -> vec3<f32> {
 /// lowest point and at the edges of the planet's shadow; each stretch has `steps` steps of two samples, whose lengths grow
 /// with the square of the distance from its lowest end, and each lit sample a march of `light_steps` steps to the sun.
 ///
-/// Loops run for up to 3 stretches times 2 steps times light_steps rounds: keep steps times light_steps below 10,000, since
-/// some devices end loops after 65,535 rounds.
+/// Some devices end all loops of a function after 65,535 rounds, those of neighbours counted together and the end of a loop
+/// as one: keep 4 steps (2 light_steps + 3) below that.
 ///
 /// domain  ray.altitude in [0, 1e5] m lin
 /// domain  ray.mu in [-1, 1] 1 lin
