@@ -42,11 +42,11 @@ fn leading_half(x: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) & 0xfffff000u);
 }
 
-/// A number of [-1, 1] rounded down to 12 bits behind the point.
+/// A number of [-1, 1] cut off after 12 bits behind the point.
 ///
 /// internal
 fn twelve_bits(x: f32) -> f32 {
-    return floor(x * 4096.0) * 0.000244140625;
+    return trunc(x * 4096.0) * 0.000244140625;
 }
 
 /// Zenith cosine and sine of a unit vector. Of its vertical and its horizontal part the smaller is taken as exact, since it
@@ -74,6 +74,7 @@ fn zenith_parts(dir: vec3<f32>) -> vec2<f32> {
 /// domain  dir in [-1, 1] 1 lin
 /// range   [-1e7, 1e8] m
 /// error   16 abs of reference::air_ray::tangent_altitude
+/// outside undefined
 /// source  r sin - R with the leading halves of both products subtracted first: ours
 fn tangent_altitude(ground_radius: f32, h: f32, dir: vec3<f32>) -> f32 {
     if dir.y * dir.y < 0.5 {

@@ -89,8 +89,8 @@ fn march_air(air: Air, ray: AirRay, steps: i32, light_steps: i32) -> AirLight {
     let count = max(steps, 1);
     let low = lowest_distance(air.ground_radius, ray);
     let dark = ray.dark_from < ray.dark_to;
-    let dark_from = select(ray.length, ray.dark_from, dark);
-    let dark_to = select(ray.length, ray.dark_to, dark);
+    let dark_from = select(ray.length, clamp(ray.dark_from, 0.0, ray.length), dark);
+    let dark_to = select(ray.length, clamp(ray.dark_to, 0.0, ray.length), dark);
     // The ends of the stretches in order.
     var ends = vec4<f32>(min(low, dark_from), clamp(low, dark_from, dark_to), max(low, dark_to), ray.length);
     let phases = air_phases(air, ray.nu);
