@@ -314,7 +314,7 @@ fn row_a09_the_march_meets_slices_composited_from_the_far_end() {
             let sun = sky.transmittance(sky.columns(h, mu, out));
             let densities = sky.densities(h);
             let extinction = sky.extinction(densities);
-            for c in 0..3 {
+            for (c, composed) in composed.iter_mut().enumerate() {
                 let scattered: f64 = air
                     .layers
                     .iter()
@@ -322,7 +322,7 @@ fn row_a09_the_march_meets_slices_composited_from_the_far_end() {
                     .sum();
                 let kept = (-extinction[c] * size).exp();
                 let own = size * math::one_minus_exp_over_x(extinction[c] * size);
-                composed[c] = composed[c] * kept + sun[c] * scattered * own;
+                *composed = *composed * kept + sun[c] * scattered * own;
             }
         }
         let found = probe(&air, 96, 24, &[view])[0];
@@ -819,7 +819,7 @@ fn the_tangent_altitude_is_right_to_a_metre_from_anywhere() {
         // About the limb, where it matters, and anywhere.
         let level = random.between(-2e5, 2e5);
         let sine = ((6.36e6 + f64::from(level)) / (6.36e6 + f64::from(h))).min(1.0);
-        let around = f64::from(random.between(0.0, 6.28));
+        let around = f64::from(random.between(0.0, std::f32::consts::TAU));
         let d = [
             sine * around.cos(),
             -(1.0 - sine * sine).sqrt(),
