@@ -93,8 +93,8 @@ pub struct ProbeOptions {
     pub quality: SkyQuality,
     /// Steps along each stretch of a ray, at least 1; a step has two samples.
     pub steps: u32,
-    /// Steps towards the sun at every sample, at least 1. Three stretches' rounds of all loops must stay below 65,535, where
-    /// some devices end loops: `3 steps (2 light_steps + 1)`.
+    /// Steps towards the sun at every sample, at least 1. Some devices end loops after 65,535 rounds, so that
+    /// `4 steps (2 light_steps + 3)` must stay below that.
     pub light_steps: u32,
 }
 
@@ -201,12 +201,12 @@ impl Probe {
                 return Err(outside(name, count, "in [1, 4096]"));
             }
         }
-        let rounds = 3 * steps * (2 * light_steps + 1) + steps + 4;
+        let rounds = 4 * steps * (2 * light_steps + 3) + 16;
         if rounds > MOST_ROUNDS {
             return Err(outside(
                 "steps",
                 format!("{steps} with {light_steps} light steps"),
-                "so few that 3 steps (2 light_steps + 1) stay below 65,535",
+                "so few that 4 steps (2 light_steps + 3) stays below 65,535",
             ));
         }
         let program = programs.get("probe", atmosphere.features())?;

@@ -63,7 +63,7 @@ pub fn march_air(air: &Atmosphere, ray: &AirRay, steps: i32, light_steps: i32) -
     let steps = steps.max(1);
     let low = lowest_distance(air.planet_radius, ray);
     let [dark_from, dark_to] = if ray.dark_from < ray.dark_to {
-        [ray.dark_from, ray.dark_to]
+        [ray.dark_from, ray.dark_to].map(|t| t.clamp(0.0, ray.length))
     } else {
         [ray.length; 2]
     };

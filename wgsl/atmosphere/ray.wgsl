@@ -42,6 +42,13 @@ fn leading_half(x: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) & 0xfffff000u);
 }
 
+/// A number of [-1, 1] cut off after 12 bits behind the point.
+///
+/// internal
+fn twelve_bits(x: f32) -> f32 {
+    return trunc(x * 4096.0) * 0.000244140625;
+}
+
 /// Zenith cosine and sine of a unit vector. Of its vertical and its horizontal part the smaller is taken as exact, since it
 /// has the finer digits.
 ///
@@ -60,39 +67,35 @@ fn zenith_parts(dir: vec3<f32>) -> vec2<f32> {
 }
 
 /// Altitude of the point of a straight line that is closest to the planet's centre, for a unit vector `dir` at altitude `h`:
-/// right to a metre from anywhere. A line through the centre gives -ground_radius.
+/// right to a metre near the planet, from anywhere. A line through the centre gives -ground_radius.
 ///
 /// domain  ground_radius in [3e6, 1e7] m log
 /// domain  h in [0, 1e8] m lin
 /// domain  dir in [-1, 1] 1 lin
 /// range   [-1e7, 1e8] m
-/// error   1.5e-7 rel of reference::air_ray::tangent_altitude
+/// error   16 abs of reference::air_ray::tangent_altitude
+/// outside undefined
 /// source  r sin - R with the leading halves of both products subtracted first: ours
 fn tangent_altitude(ground_radius: f32, h: f32, dir: vec3<f32>) -> f32 {
     if dir.y * dir.y < 0.5 {
         let sine = sqrt((1.0 - dir.y) * (1.0 + dir.y));
         return h - (ground_radius + h) * (dir.y * dir.y) / (1.0 + sine);
     }
-    // h sine - R (1 - sine), and what sine lacks to be the root of x^2 + z^2.
+    // h sine - R (1 - sine), in which products of heads are exact, as is what sine lacks to be the root of x^2 + z^2.
     let sine = length(dir.xz);
-    let gap = 1.0 - sine;
-    let sine_head = leading_half(sine);
-    let x_head = leading_half(dir.x);
-    let z_head = leading_half(dir.z);
-    let small = min(abs(x_head), abs(z_head));
-    let large = max(abs(x_head), abs(z_head));
-    let heads = (large - sine_head) * (large + sine_head) + small * small;
+    let sine_head = twelve_bits(sine);
+    let x_head = twelve_bits(dir.x);
+    let z_head = twelve_bits(dir.z);
+    let heads = (x_head * x_head - sine_head * sine_head) + z_head * z_head;
     let tails = (dir.x - x_head) * (dir.x + x_head) + (dir.z - z_head) * (dir.z + z_head)
         - (sine - sine_head) * (sine + sine_head);
-    let rest = 0.5 * (heads + tails) / max(sine, 1e-20);
+    let rest = (sine - sine_head) + 0.5 * (heads + tails) / max(sine, 1e-20);
+    let gap_head = 1.0 - sine_head;
     let h_head = leading_half(h);
     let radius_head = leading_half(ground_radius);
-    let gap_head = leading_half(gap);
-    let gap_rest = (1.0 - gap) - sine;
     let head = h_head * sine_head - radius_head * gap_head;
-    let tail = (h_head * (sine - sine_head) + (h - h_head) * sine)
-        - (radius_head * (gap - gap_head) + (ground_radius - radius_head) * gap);
-    return max(head + (tail + (ground_radius * (rest - gap_rest) + h * rest)), -ground_radius);
+    let tail = (h - h_head) * sine_head - (ground_radius - radius_head) * gap_head;
+    return max(head + (tail + (ground_radius + h) * rest), -ground_radius);
 }
 
 /// A ray from a place in the air, up to `max_distance`. The unit vectors are given in a frame with y up at the start: `dir` by
@@ -176,7 +179,7 @@ fn ray_inside(ground_radius: f32, top: f32, h: f32, dir: vec2<f32>, to_sun: vec3
 /// domain  to_sun in [-1, 1] 1 lin
 /// domain  max_distance in [1, 1e9] m log
 /// range   [-1, 1e9] 1
-/// error   3e-6 abs of reference::air_ray::air_ray
+/// error   1e-5 abs of reference::air_ray::air_ray
 /// source  Bruneton2017 (boundary distances); entry by the tangent altitude: ours
 fn air_ray(ground_radius: f32, top: f32, eye_altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, max_distance: f32) -> AirRay {
     let h = max(eye_altitude, 0.0);

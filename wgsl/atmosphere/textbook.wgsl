@@ -74,8 +74,8 @@ fn march_sun_depth(air: Air, h: f32, sun_mu: f32, steps: i32) -> vec3<f32> {
 /// lowest point and at the edges of the planet's shadow; each stretch has `steps` steps of two samples, whose lengths grow
 /// with the square of the distance from its lowest end, and each lit sample a march of `light_steps` steps to the sun.
 ///
-/// Loops run for up to 3 stretches times 2 steps times light_steps rounds: keep steps times light_steps below 10,000, since
-/// some devices end loops after 65,535 rounds.
+/// Some devices end all loops of a function after 65,535 rounds, those of neighbours counted together and the end of a loop
+/// as one: keep 4 steps (2 light_steps + 3) below that.
 ///
 /// domain  ray.altitude in [0, 1e5] m lin
 /// domain  ray.mu in [-1, 1] 1 lin
@@ -89,8 +89,8 @@ fn march_air(air: Air, ray: AirRay, steps: i32, light_steps: i32) -> AirLight {
     let count = max(steps, 1);
     let low = lowest_distance(air.ground_radius, ray);
     let dark = ray.dark_from < ray.dark_to;
-    let dark_from = select(ray.length, ray.dark_from, dark);
-    let dark_to = select(ray.length, ray.dark_to, dark);
+    let dark_from = select(ray.length, clamp(ray.dark_from, 0.0, ray.length), dark);
+    let dark_to = select(ray.length, clamp(ray.dark_to, 0.0, ray.length), dark);
     // The ends of the stretches in order.
     var ends = vec4<f32>(min(low, dark_from), clamp(low, dark_from, dark_to), max(low, dark_to), ray.length);
     let phases = air_phases(air, ray.nu);

@@ -1,5 +1,6 @@
 //! Every public function's f64 twin, called with the bits of a row, and what is particular about its arguments.
 
+use veduta::reference::air_ray::{self, AirRay};
 use veduta::reference::atmosphere::{Atmosphere, SkyLight};
 use veduta::reference::clouds::{CloudLayer, CloudLight};
 use veduta::reference::fractal::warp;
@@ -7,6 +8,7 @@ use veduta::reference::noise::{Lattice2d, Lattice3d, simplex, worley};
 use veduta::reference::phase::DropletPhase;
 use veduta::reference::planet::{ShellSegment, Span};
 use veduta::reference::terrain::{Rock, Terrain, TerrainHit, ThreeLights};
+use veduta::reference::textbook::{self, AirLight};
 use veduta::reference::{
     atmosphere, clouds, fractal, hash, math, medium, noise, phase, planet, post, terrain, tone_map,
 };
@@ -15,7 +17,7 @@ use veduta_compose::header::{Bound, Interval, Spacing};
 use super::airs;
 
 /// The most numbers that a result has.
-pub const MOST: usize = 8;
+pub const MOST: usize = 10;
 
 /// The numbers of a twin's result, in the order of the function's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -174,6 +176,19 @@ argument!(DropletPhase {
     broad_share: f64
 });
 
+argument!(AirRay {
+    altitude: f64,
+    mu: f64,
+    sine: f64,
+    nu: f64,
+    sun_mu: f64,
+    from_eye: f64,
+    length: f64,
+    dark_from: f64,
+    dark_to: f64,
+    meets_ground: u32
+});
+
 impl Argument for CloudLight {
     const COLUMNS: usize = 5;
     fn read(bits: &[u32]) -> CloudLight {
@@ -284,6 +299,30 @@ impl Answer for DropletPhase {
 }
 
 impl Answer for SkyLight {
+    fn values(self) -> Values {
+        let ([a, b, c], [d, e, f]) = (self.in_scatter, self.transmittance);
+        Values::new(&[a, b, c, d, e, f])
+    }
+}
+
+impl Answer for AirRay {
+    fn values(self) -> Values {
+        Values::new(&[
+            self.altitude,
+            self.mu,
+            self.sine,
+            self.nu,
+            self.sun_mu,
+            self.from_eye,
+            self.length,
+            self.dark_from,
+            self.dark_to,
+            f64::from(self.meets_ground),
+        ])
+    }
+}
+
+impl Answer for AirLight {
     fn values(self) -> Values {
         let ([a, b, c], [d, e, f]) = (self.in_scatter, self.transmittance);
         Values::new(&[a, b, c, d, e, f])
@@ -563,6 +602,19 @@ impl Entry {
             .lin("atmosphere.mie_height", 1400.0, 4e3)
             .lin("atmosphere.mie_g", -0.9, 0.9)
             .ascending(&["atmosphere.mie_scattering", "atmosphere.mie_extinction"])
+    }
+
+    fn ray(self) -> Entry {
+        self.lin("ray.altitude", 0.0, 1e5)
+            .lin("ray.mu", -1.0, 1.0)
+            .lin("ray.sine", 0.0, 1.0)
+            .lin("ray.nu", -1.0, 1.0)
+            .lin("ray.sun_mu", -1.0, 1.0)
+            .lin("ray.from_eye", 0.0, 1e8)
+            .lin("ray.length", 0.0, 1.2e6)
+            .lin("ray.dark_from", 0.0, 1.2e6)
+            .lin("ray.dark_to", 0.0, 1.2e6)
+            .lin("ray.meets_ground", 0.0, 1.0)
     }
 
     fn layer(self) -> Entry {
@@ -970,6 +1022,55 @@ pub fn registry() -> Vec<Entry> {
         atmosphere,
         sun_disc
     );
+    same!(
+        list,
+        "atmosphere::ray",
+        "air_ray",
+        air_ray,
+        zenith_parts,
+        tangent_altitude,
+        ray_inside,
+        air_ray
+    );
+    other!(
+        list,
+        "atmosphere::ray::ray_altitude",
+        "air_ray::ray_altitude",
+        |radius: f64, ray: AirRay, t: f64| air_ray::ray_altitude(radius, &ray, t)
+    );
+    other!(
+        list,
+        "atmosphere::ray::ray_sun_cosine",
+        "air_ray::ray_sun_cosine",
+        |radius: f64, ray: AirRay, altitude: f64, t: f64| air_ray::ray_sun_cosine(
+            radius, &ray, altitude, t
+        )
+    );
+    other!(
+        list,
+        "atmosphere::ray::lowest_distance",
+        "air_ray::lowest_distance",
+        |radius: f64, ray: AirRay| air_ray::lowest_distance(radius, &ray)
+    );
+    other!(
+        list,
+        "atmosphere::textbook::march_sun_depth",
+        "textbook::march_sun_depth",
+        |air: Air, h: f64, sun_mu: f64, steps: i32| textbook::march_sun_depth(
+            air.0, h, sun_mu, steps
+        )
+    );
+    other!(
+        list,
+        "atmosphere::textbook::march_air",
+        "textbook::march_air",
+        |air: Air, ray: AirRay, steps: i32, light_steps: i32| textbook::march_air(
+            air.0,
+            &ray,
+            steps,
+            light_steps
+        )
+    );
     other!(
         list,
         "atmosphere::medium::air_densities",
@@ -1319,6 +1420,31 @@ fn particular(entry: Entry) -> Entry {
             )
             .energy(sky_energy)
             .weight(300.0),
+        ("atmosphere::ray", "zenith_parts") => entry.unit("dir"),
+        ("atmosphere::ray", "tangent_altitude") => entry
+            .unit("dir")
+            .log("h", 1.0, 1e8)
+            .branch("h", &[1e5, 3.6e7]),
+        ("atmosphere::ray", "ray_inside") => entry
+            .unit("dir")
+            .unit("to_sun")
+            .judged(&["mu", "sine", "nu", "sun_mu"]),
+        ("atmosphere::ray", "air_ray") => entry
+            .unit("dir")
+            .unit("to_sun")
+            .log("eye_altitude", 1.0, 1e8)
+            .judged(&["mu", "sine", "nu", "sun_mu"])
+            .jumps("rays that graze the top of the air", 1e-6),
+        ("atmosphere::ray", "ray_altitude" | "ray_sun_cosine" | "lowest_distance") => entry.ray(),
+        ("atmosphere::textbook", "march_sun_depth") => entry.lin("steps", 1.0, 32.0).weight(30.0),
+        ("atmosphere::textbook", "march_air") => entry
+            .ray()
+            .lin("ray.nu", -1.0, 0.9)
+            .lin("steps", 1.0, 16.0)
+            .lin("light_steps", 1.0, 8.0)
+            .ascending(&["ray.dark_from", "ray.dark_to"])
+            .jumps("the border of the planet's shadow", 1e-6)
+            .weight(600.0),
         ("atmosphere::medium", _) => entry
             .branch("nu", &[0.999, 0.9999])
             .branch("h", &[1e3, 2e3, 3e3, 4e3, 5e3, 1e4, 1.2e4, 2.5e4, 3e4, 4e4]),
