@@ -25,8 +25,6 @@ struct SkyDraw {
     exposure: f32,
     // Of the sun at the top of the air.
     sun_irradiance: vec3<f32>,
-    // Angle between neighbouring pixels in the middle of the picture [rad].
-    pixel_angle: f32,
     // 1 for parallel rays.
     parallel: u32,
 }
@@ -80,7 +78,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 override OUTPUT: i32 = 0;
 
 // Behind the host's things: the sky with the sun's disc, or the bare ground and the air before it.
-fn background(dir: vec3<f32>) -> vec3<f32> {
+fn background(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
     let place = sky_place(eye, dir);
     if place.below {
         let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
@@ -95,10 +93,10 @@ fn background(dir: vec3<f32>) -> vec3<f32> {
         return radiance + front.transmittance * air.ground_albedo * (0.31830989 * (sun + around));
     }
     var radiance = sky_radiance(sky, linear, air, eye, place);
-    if place.nu > cos(eye.sun_angular_radius + draw_view.pixel_angle) {
+    if place.nu > cos(eye.sun_angular_radius + pixel_angle) {
         let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
         let front = aerial_light(light, depths, linear, air, eye, place, ray.length, ray.length);
-        radiance += front.transmittance * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, draw_view.pixel_angle);
+        radiance += front.transmittance * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle);
     }
     return radiance;
 }
@@ -142,10 +140,11 @@ struct Layers {
 
 @fragment
 fn draw(in: Corner) -> Layers {
+    let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
+    let pixel_angle = length(dpdx(dir));
     let seen = textureLoad(depth, vec2<i32>(in.position.xy), 0);
     if seen == draw_view.far_depth {
-        let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
-        return Layers(vec4<f32>(background(dir) * draw_view.sun_irradiance, 1.0), vec4<f32>(0.0, 0.0, 0.0, 1.0));
+        return Layers(vec4<f32>(background(dir, pixel_angle) * draw_view.sun_irradiance, 1.0), vec4<f32>(0.0, 0.0, 0.0, 1.0));
     }
     let front = before(in.ray, seen);
     return Layers(vec4<f32>(front.in_scatter * draw_view.sun_irradiance, 1.0), vec4<f32>(front.transmittance, 1.0));
@@ -153,11 +152,12 @@ fn draw(in: Corner) -> Layers {
 #else
 @fragment
 fn draw(in: Corner) -> @location(0) vec4<f32> {
+    let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
+    let pixel_angle = length(dpdx(dir));
     let texel = vec2<i32>(in.position.xy);
     let seen = textureLoad(depth, texel, 0);
     if seen == draw_view.far_depth {
-        let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
-        return shown(background(dir) * draw_view.sun_irradiance, in.position.xy);
+        return shown(background(dir, pixel_angle) * draw_view.sun_irradiance, in.position.xy);
     }
     let front = before(in.ray, seen);
     let radiance = front.in_scatter * draw_view.sun_irradiance + front.transmittance * textureLoad(picture, texel, 0).rgb;
@@ -168,7 +168,7 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
 @fragment
 fn draw(in: Corner) -> @location(0) vec4<f32> {
     let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
-    return shown(background(dir) * draw_view.sun_irradiance, in.position.xy);
+    return shown(background(dir, length(dpdx(dir))) * draw_view.sun_irradiance, in.position.xy);
 }
 #endif
     }#
