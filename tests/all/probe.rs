@@ -326,8 +326,8 @@ fn row_a09_the_march_meets_slices_composited_from_the_far_end() {
             }
         }
         let found = probe(&air, 96, 24, &[view])[0];
-        for c in 0..3 {
-            let off = (f64::from(found.in_scatter[c]) / composed[c] - 1.0).abs();
+        for (found, composed) in found.in_scatter.iter().zip(composed) {
+            let off = (f64::from(*found) / composed - 1.0).abs();
             assert!(off < 1e-3, "{elevation}: {off:e}");
         }
     }
