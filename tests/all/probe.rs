@@ -5,7 +5,7 @@ use crate::accuracy::{bits, log_between, rows};
 use crate::common::{Random, evaluator, gpu};
 use veduta::Atmosphere;
 use veduta::atmosphere::{
-    AirRay, Layer, Orders, Phase, Probe, ProbeLight, ProbeOptions, ProbePath, ProbeRay, Profile,
+    AirRay, Layer, Phase, Probe, ProbeLight, ProbeOptions, ProbeRay, Profile,
 };
 use veduta::reference::parallel::parallel_map;
 use veduta::reference::sky::{Sky, SkyRadiance, SkyRay};
@@ -16,10 +16,9 @@ const TOP: f64 = 100_000.0;
 
 fn options(steps: u32, light_steps: u32) -> ProbeOptions {
     ProbeOptions {
-        path: ProbePath::Textbook,
-        orders: Orders::Single,
         steps,
         light_steps,
+        ..Default::default()
     }
 }
 
