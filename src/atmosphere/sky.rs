@@ -77,12 +77,27 @@ pub struct Sky {
     tables: SkyTables,
     targets: Targets,
     composition: SkyComposition,
-    pipeline: wgpu::RenderPipeline,
+    /// For an eye within the air, and for one above it.
+    pipelines: [Pass; 2],
+    outside: bool,
     layouts: Vec<wgpu::BindGroupLayout>,
     draw: wgpu::Buffer,
     draw_bytes: Vec<u8>,
-    groups: Vec<wgpu::BindGroup>,
     host: Option<wgpu::BindGroup>,
+}
+
+/// A pipeline with what is bound to it.
+#[derive(Debug)]
+struct Layer {
+    pipeline: wgpu::RenderPipeline,
+    groups: Vec<wgpu::BindGroup>,
+}
+
+/// What is drawn: the sky, and over it the sun's disc in a square of its own, so that no other pixel pays for it.
+#[derive(Debug)]
+struct Pass {
+    sky: Layer,
+    disc: Option<Layer>,
 }
 
 impl Sky {
@@ -117,95 +132,123 @@ impl Sky {
         }
         let settings = Settings::resolve(programs, &options.preset, None, &[])?;
         let quality = SkyQuality::of(&settings);
-        let tables = SkyTables::new(device, programs, &options.atmosphere, &quality)?;
+        let tables = SkyTables::with_ground(device, programs, &options.atmosphere, &quality)?;
         let mut features = options.atmosphere.features().to_vec();
         match options.composition {
             SkyComposition::Background => {}
             SkyComposition::OverPicture => features.push("AERIAL"),
             SkyComposition::TwoTargets => features.extend(["AERIAL", "AERIAL_TARGETS"]),
         }
-        let program = programs.get("sky", &features)?;
-        let constants: Vec<(&str, f64)> = program
-            .overrides
-            .iter()
-            .filter(|o| o.name == "OUTPUT")
-            .map(|o| (o.name.as_ref(), output))
-            .collect();
-        let format = Some(targets.color_format.into());
-        let both = [format.clone(), format];
-        let count = if options.composition == SkyComposition::TwoTargets {
-            2
-        } else {
-            1
-        };
-        let ReadyPipeline {
-            pipeline,
-            bind_group_layouts,
-        } = program.pipeline(
-            device,
-            &PipelineOptions {
-                targets: &both[..count],
-                depth_stencil: targets
-                    .depth_format
-                    .filter(|_| !reads_depth)
-                    .map(|format| wgpu::DepthStencilState {
-                        format,
-                        depth_write_enabled: Some(false),
-                        depth_compare: Some(match targets.depth {
-                            Depth::Normal => wgpu::CompareFunction::LessEqual,
-                            Depth::Reversed | Depth::ReversedInfinite => {
-                                wgpu::CompareFunction::GreaterEqual
-                            }
-                        }),
-                        stencil: Default::default(),
-                        bias: Default::default(),
-                    }),
-                sample_count: targets.sample_count,
-                constants: &constants,
-                ..Default::default()
-            },
-        )?;
-        let Pipeline::Render(pipeline) = pipeline else {
-            return Err(Error::MissingStage {
-                program: "sky".to_owned(),
-            });
-        };
         let draw = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("veduta sky view"),
             size: DrawBlock::SIZE as u64,
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let view = wgpu::BindingResource::TextureView;
-        let groups = bind_groups(
-            device,
-            "veduta sky",
-            &bind_group_layouts[..2],
-            &[
-                &[
+        let depth_stencil = targets
+            .depth_format
+            .filter(|_| !reads_depth)
+            .map(|format| wgpu::DepthStencilState {
+                format,
+                depth_write_enabled: Some(false),
+                depth_compare: Some(match targets.depth {
+                    Depth::Normal => wgpu::CompareFunction::LessEqual,
+                    Depth::Reversed | Depth::ReversedInfinite => {
+                        wgpu::CompareFunction::GreaterEqual
+                    }
+                }),
+                stencil: Default::default(),
+                bias: Default::default(),
+            });
+        let format = Some(targets.color_format.into());
+        let both = [format.clone(), format];
+        let count = 1 + usize::from(options.composition == SkyComposition::TwoTargets);
+        let mut layouts = Vec::new();
+        let mut pass = |outside: bool| -> Result<Pass, Error> {
+            let mut layer = |features: &[&str]| {
+                let program = programs.get("sky", features)?;
+                let constants: Vec<(&str, f64)> = program
+                    .overrides
+                    .iter()
+                    .map(|o| {
+                        let value = if o.name == "OUTPUT" {
+                            output
+                        } else {
+                            f64::from(u8::from(outside))
+                        };
+                        (o.name.as_ref(), value)
+                    })
+                    .collect();
+                let ReadyPipeline {
+                    pipeline,
+                    bind_group_layouts,
+                } = program.pipeline(
+                    device,
+                    &PipelineOptions {
+                        targets: &both[..count],
+                        depth_stencil: depth_stencil.clone(),
+                        sample_count: targets.sample_count,
+                        constants: &constants,
+                        ..Default::default()
+                    },
+                )?;
+                let Pipeline::Render(pipeline) = pipeline else {
+                    return Err(Error::MissingStage {
+                        program: "sky".to_owned(),
+                    });
+                };
+                // A variant has only the bindings that it reads.
+                let has = |group: u32, binding: u32| {
+                    program
+                        .bindings
+                        .iter()
+                        .any(|b| b.group == group && b.binding == binding)
+                };
+                let view = wgpu::BindingResource::TextureView;
+                let mut first = vec![
                     (0, tables.air().as_entire_binding()),
                     (1, tables.eye().as_entire_binding()),
                     (2, draw.as_entire_binding()),
-                ],
-                &[
+                ];
+                first.retain(|(binding, _)| has(0, *binding));
+                let mut second = vec![
                     (0, wgpu::BindingResource::Sampler(tables.sampler())),
                     (1, view(tables.sky())),
-                    (2, view(tables.columns())),
-                    (3, view(tables.diffuse())),
-                    (4, view(tables.aerial())),
-                    (5, view(tables.aerial_depths())),
-                ],
-            ],
-        );
+                    (2, view(tables.aerial())),
+                    (3, view(tables.aerial_depths())),
+                ];
+                second.retain(|(binding, _)| has(1, *binding));
+                let groups = bind_groups(
+                    device,
+                    "veduta sky",
+                    &bind_group_layouts[..2],
+                    &[&first, &second],
+                );
+                if bind_group_layouts.len() > 2 {
+                    layouts = bind_group_layouts;
+                }
+                Ok(Layer { pipeline, groups })
+            };
+            let sky = layer(&features)?;
+            let disc = if reads_depth || targets.projection == Projection::Orthographic {
+                None
+            } else {
+                let mut features = features.clone();
+                features.push("SUN_DISC");
+                Some(layer(&features)?)
+            };
+            Ok(Pass { sky, disc })
+        };
+        let pipelines = [pass(false)?, pass(true)?];
         Ok(Sky {
             tables,
             targets: *targets,
             composition: options.composition,
-            pipeline,
-            layouts: bind_group_layouts,
+            pipelines,
+            outside: false,
+            layouts,
             draw,
             draw_bytes: Vec::new(),
-            groups,
             host: None,
         })
     }
@@ -223,10 +266,18 @@ impl Sky {
     /// What it keeps on the device.
     pub fn resources(&self) -> Resources {
         let tables = self.tables.resources();
+        let layers = || {
+            self.pipelines
+                .iter()
+                .flat_map(|pass| [Some(&pass.sky), pass.disc.as_ref()])
+                .flatten()
+        };
         Resources {
-            pipelines: tables.pipelines + 1,
-            bind_groups: tables.bind_groups + self.groups.len() as u32 + u32::from(self.host.is_some()),
-            bindings: tables.bindings + 9,
+            pipelines: tables.pipelines + layers().count() as u32,
+            bind_groups: tables.bind_groups
+                + layers().map(|l| l.groups.len() as u32).sum::<u32>()
+                + u32::from(self.host.is_some()),
+            bindings: tables.bindings + 7 * layers().count() as u32,
             buffers: tables.buffers + 1,
             buffer_bytes: tables.buffer_bytes + self.draw.size(),
             ..tables
@@ -267,7 +318,7 @@ impl Sky {
             }
             (SkyComposition::TwoTargets, _) => {}
         }
-        self.host = bind_groups(device, "veduta host", &self.layouts[2..], &[&bound]).pop();
+        self.host = bind_groups(device, "veduta host", self.layouts.get(2..).unwrap_or_default(), &[&bound]).pop();
         Ok(())
     }
 
@@ -289,6 +340,7 @@ impl Sky {
             sun_angular_radius: f64::from(view.sun.angular_radius),
         };
         let block = self.draw_block(view)?;
+        self.outside = eye.altitude as f32 > self.tables.atmosphere().thickness as f32;
         let mut work = self.tables.prepare(queue, encoder, &eye)?;
         let bytes = block.to_bytes().to_vec();
         if bytes != self.draw_bytes {
@@ -357,14 +409,19 @@ impl Sky {
                 domain: "what `Sky::set_host` has been given".to_owned(),
             });
         }
-        pass.set_pipeline(&self.pipeline);
-        for (group, index) in self.groups.iter().chain(&self.host).zip(0..) {
-            pass.set_bind_group(index, group, &[]);
+        let Pass { sky, disc } = &self.pipelines[usize::from(self.outside)];
+        let mut work = Work::default();
+        for (layer, vertices) in [(Some(sky), 3), (disc.as_ref(), 6)] {
+            let Some(layer) = layer else {
+                continue;
+            };
+            pass.set_pipeline(&layer.pipeline);
+            for (group, index) in layer.groups.iter().chain(&self.host).zip(0..) {
+                pass.set_bind_group(index, group, &[]);
+            }
+            pass.draw(0..vertices, 0..1);
+            work.draws += 1;
         }
-        pass.draw(0..3, 0..1);
-        Ok(Work {
-            draws: 1,
-            ..Default::default()
-        })
+        Ok(work)
     }
 }
