@@ -60,10 +60,13 @@ fn azimuth_place(eye: SkyEye, aside: vec2<f32>) -> f32 {
 /// source  ours
 fn sky_place_inside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
     // Tangent of half the zenith angle over that of the horizon, or the same from the nadir.
-    let above = length(dir.xz) / max(1.0 + dir.y, 1e-20);
-    let below = above > eye.horizon;
-    let ratio = select(above / eye.horizon, eye.horizon / above, below);
-    return SkyPlace(azimuth_place(eye, dir.xz), sqrt(clamp(1.0 - ratio, 0.0, 1.0)), below, dot(dir, eye.to_sun));
+    let aside = dot(dir.xz, dir.xz);
+    let over = inverseSqrt(max(aside, 1e-20));
+    let ratio = aside * over / max((1.0 + dir.y) * eye.horizon, 1e-20);
+    let flat = inverseSqrt(max(dot(eye.to_sun.xz, eye.to_sun.xz), 1e-20));
+    let azimuth = clamp(dot(dir.xz, eye.to_sun.xz) * (over * flat), -1.0, 1.0);
+    let y = sqrt(max(1.0 - min(ratio, 1.0 / ratio), 0.0));
+    return SkyPlace(0.5 - 0.5 * azimuth, y, ratio > 1.0, dot(dir, eye.to_sun));
 }
 
 /// Place of a unit vector `dir` in the tables of an eye above the air.
