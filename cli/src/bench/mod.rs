@@ -6,6 +6,7 @@ pub mod knob;
 pub mod noise;
 pub mod plot;
 pub mod presets;
+pub mod sky;
 pub mod timing;
 pub mod truth;
 

@@ -6,7 +6,7 @@ use indicatif::ProgressBar;
 
 use crate::bench::knob::{self, Effect, Knob};
 use crate::bench::timing::{Clock, Rounds};
-use crate::bench::{Bench, baseline, chapter6, noise, presets, write_text};
+use crate::bench::{Bench, baseline, chapter6, noise, presets, sky, write_text};
 use crate::catalog::{Catalog, SourceArgs};
 use crate::commands::render::{RenderArgs, read_json, write_json};
 use crate::error::CliError;
@@ -26,6 +26,8 @@ pub enum Subject {
     Baseline,
     /// Throughput of the noises.
     Noise,
+    /// Tables and draws of the sky, against marches without tables.
+    Sky,
 }
 
 /// Arguments of `veduta bench`.
@@ -151,7 +153,13 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
         }
         (None, Some(_)) => Subject::Knob,
         (
-            Some(Subject::Presets | Subject::Chapter6 | Subject::Baseline | Subject::Noise),
+            Some(
+                Subject::Presets
+                | Subject::Chapter6
+                | Subject::Baseline
+                | Subject::Noise
+                | Subject::Sky,
+            ),
             Some(knob),
         ) => {
             return Err(CliError::argument(
@@ -207,17 +215,12 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
     };
     let gpu = veduta::device::shared()?;
     let natural = Clock::of(&gpu.adapter.get_info(), gpu.device.features());
-    let size = args.size.unwrap_or(if subject == Subject::Presets {
-        Size {
-            width: 128,
-            height: 72,
-        }
-    } else {
-        Size {
-            width: 256,
-            height: 144,
-        }
-    });
+    let (width, height) = match subject {
+        Subject::Presets => (128, 72),
+        Subject::Sky => (800, 450),
+        _ => (256, 144),
+    };
+    let size = args.size.unwrap_or(Size { width, height });
     size.check(&gpu.device)?;
     let bench = Bench {
         gpu: gpu.clone(),
@@ -298,6 +301,19 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 write_json(
                     &path.with_extension("json"),
                     &noise::to_json(&bench, &rounds, &command),
+                )?;
+            }
+        }
+        Subject::Sky => {
+            let report = sky::run(&bench, rounds.least, &mut progress)?;
+            bar.finish_and_clear();
+            let text = sky::markdown(&bench, &report, &command);
+            print!("{text}");
+            if let Some(path) = &args.out {
+                write_text(path, &text)?;
+                write_json(
+                    &path.with_extension("json"),
+                    &sky::to_json(&bench, &report, &command),
                 )?;
             }
         }
