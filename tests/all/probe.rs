@@ -20,6 +20,7 @@ fn options(steps: u32, light_steps: u32) -> ProbeOptions {
         orders: Orders::Single,
         steps,
         light_steps,
+        ..Default::default()
     }
 }
 
