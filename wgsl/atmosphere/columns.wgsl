@@ -64,7 +64,7 @@ fn column_place(ground_radius: f32, top: f32, place: vec2<f32>) -> vec2<f32> {
 /// domain  h in [0, air.top] m lin
 /// domain  mu in [-1, 1] 1 lin
 /// range   [0, 1] 1
-/// error   4e-6 abs of reference::air_tables::column_scale
+/// error   1e-5 abs of reference::air_tables::column_scale
 /// outside undefined
 /// source  ours
 fn column_scale(air: Air, h: f32, mu: f32) -> Lanes {

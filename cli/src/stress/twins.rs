@@ -1657,6 +1657,7 @@ fn particular(entry: Entry) -> Entry {
             .lin("h", 0.0, 5e4)
             .branch("h", &[100.0, 1e3, 1e4])
             .branch("mu", &[-0.1, -0.01, -1e-3, 1e-3, 0.01])
+            .jumps("level rays from the top", 1e-6)
             .weight(30.0),
         ("atmosphere::columns", "sun_above_horizon") => entry
             .branch("mu", &[-0.1, -0.01, -1e-3])
