@@ -12,6 +12,7 @@ fn main() {
     println!("cargo::metadata=DEFAULT_PRESET={default}");
     let mut build = veduta_compose::Build::of_veduta("wgsl", "presets")
         .variant("sky", ["AERIAL"])
+        .variant("sky", ["SUN_DISC"])
         .variant("sky", ["AERIAL", "AERIAL_TARGETS"]);
     for program in [
         "air_columns",
@@ -23,7 +24,12 @@ fn main() {
     ] {
         build = build.variant(program, ["AIR_EIGHT_LANES"]);
     }
-    for more in [&["AERIAL"][..], &["AERIAL", "AERIAL_TARGETS"], &[]] {
+    for more in [
+        &["AERIAL"][..],
+        &["SUN_DISC"],
+        &["AERIAL", "AERIAL_TARGETS"],
+        &[],
+    ] {
         build = build.variant("sky", more.iter().copied().chain(["AIR_EIGHT_LANES"]));
     }
     build.write();

@@ -50,6 +50,23 @@ pub struct Targets {
     pub projection: Projection,
 }
 
+impl Targets {
+    /// Checks what holds for every system.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for a number of samples that no pass has.
+    pub fn check(&self) -> Result<(), Error> {
+        if matches!(self.sample_count, 1 | 2 | 4 | 8 | 16) {
+            return Ok(());
+        }
+        Err(Error::OutOfDomain {
+            name: "targets.sample_count".to_owned(),
+            value: self.sample_count.to_string(),
+            domain: "1, 2, 4, 8 or 16".to_owned(),
+        })
+    }
+}
+
 impl Default for Targets {
     fn default() -> Self {
         Targets {
@@ -232,7 +249,7 @@ impl Block {
 }
 
 /// What the program writes for a colour format: the value of the override `OUTPUT`.
-fn output_of(format: wgpu::TextureFormat) -> Result<f64, Error> {
+pub(crate) fn output_of(format: wgpu::TextureFormat) -> Result<f64, Error> {
     if format.is_depth_stencil_format()
         || format.is_compressed()
         || format.components() < 3
@@ -283,13 +300,7 @@ impl Landscape {
                 domain: "Perspective: the landscape is drawn from one eye".to_owned(),
             });
         }
-        if !matches!(targets.sample_count, 1 | 2 | 4 | 8 | 16) {
-            return Err(Error::OutOfDomain {
-                name: "targets.sample_count".to_owned(),
-                value: targets.sample_count.to_string(),
-                domain: "1, 2, 4, 8 or 16".to_owned(),
-            });
-        }
+        targets.check()?;
         let output = output_of(targets.color_format)?;
         let settings = Settings::resolve(
             programs,

@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands;
 
-/// Outdoor landscapes for wgpu: render, compose, lint, list, bench, cost, stress, diff, eval, probe.
+/// Outdoor landscapes for wgpu: render, sky, compose, lint, list, bench, cost, stress, diff, eval, probe.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "veduta", version, about, arg_required_else_help = true)]
 pub struct Args {
@@ -21,6 +21,8 @@ pub enum Command {
     Render(commands::render::RenderArgs),
     /// Write a program as plain WGSL, SPIR-V, HLSL or MSL
     Compose(commands::compose::ComposeArgs),
+    /// Draw an atmosphere from any altitude
+    Sky(commands::sky::SkyArgs),
     /// Check modules, programs, presets, scenes and views; for continuous integration
     Lint(commands::lint::LintArgs),
     /// Show what there is: programs, presets, scenes, views, keys, adapters
@@ -47,6 +49,7 @@ impl Args {
     pub fn run(&self) -> Result<(), crate::CliError> {
         match &self.command {
             Command::Render(args) => commands::render::run(args),
+            Command::Sky(args) => commands::sky::run(args),
             Command::Compose(args) => commands::compose::run(args),
             Command::Lint(args) => commands::lint::run(args),
             Command::List(args) => commands::list::run(args),

@@ -7,6 +7,7 @@ mod medium;
 mod physics;
 pub mod probe;
 pub mod ray;
+mod sky;
 mod tables;
 
 pub use fast::FastProbe;
@@ -17,4 +18,5 @@ pub use medium::{
 pub use physics::{Aerosol, Molecules, aerosol_scattering, rayleigh_scattering};
 pub use probe::{Orders, Probe, ProbeLight, ProbeOptions, ProbePath, ProbeRay, probe};
 pub use ray::AirRay;
+pub use sky::{Sky, SkyComposition, SkyOptions};
 pub use tables::{Eye, SkyQuality, SkyTables};

@@ -317,6 +317,29 @@ impl SkyTables {
         atmosphere: &Atmosphere,
         quality: &SkyQuality,
     ) -> Result<SkyTables, Error> {
+        SkyTables::build(device, programs, atmosphere, quality, false)
+    }
+
+    /// As [`SkyTables::new`], but the table of the sky shows the bare ground in directions below the horizon.
+    ///
+    /// # Errors
+    /// As [`SkyTables::new`].
+    pub fn with_ground(
+        device: &wgpu::Device,
+        programs: &ProgramSet,
+        atmosphere: &Atmosphere,
+        quality: &SkyQuality,
+    ) -> Result<SkyTables, Error> {
+        SkyTables::build(device, programs, atmosphere, quality, true)
+    }
+
+    fn build(
+        device: &wgpu::Device,
+        programs: &ProgramSet,
+        atmosphere: &Atmosphere,
+        quality: &SkyQuality,
+        ground: bool,
+    ) -> Result<SkyTables, Error> {
         quality.check()?;
         let bytes = atmosphere.air_bytes()?;
         let buffer = |label, size| {
@@ -412,6 +435,7 @@ impl SkyTables {
             &[
                 ("SKY_STEPS", f64::from(quality.sky_steps)),
                 ("ALL_ORDERS", all),
+                ("SKY_GROUND", f64::from(u8::from(ground))),
             ],
         )?;
         let read = [linear.clone(), at(1, &columns), at(2, &moments[2])];

@@ -418,12 +418,23 @@ fn row_l38_every_quality_key_acts_where_it_should() {
         ("COUNT_OPERATIONS", on, &[], Everything),
         ("SHOW_DISTANCE", on, &[], Everything),
     ];
+    let acts_on = |key: &str, landscape: bool| {
+        let all = programs().programs.iter();
+        all.filter(|p| (p.program == "landscape") == landscape)
+            .any(|p| {
+                p.mentions.iter().any(|m| m == key) || p.overrides.iter().any(|o| o.name == key)
+            })
+    };
     for key in programs().keys.iter() {
         // A scene turns these on, and the target's format decides on the last.
         let elsewhere = ["TERRAIN", "ATMOSPHERE", "CLOUDS", "OUTPUT"];
         let known = cases.iter().any(|(name, ..)| key.name == *name);
+        let of_others = !acts_on(&key.name, true) && acts_on(&key.name, false);
         assert!(
-            key.kind == KeyKind::Content || elsewhere.contains(&key.name.as_ref()) || known,
+            key.kind == KeyKind::Content
+                || elsewhere.contains(&key.name.as_ref())
+                || known
+                || of_others,
             "no case for {}",
             key.name
         );

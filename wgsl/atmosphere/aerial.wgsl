@@ -22,7 +22,7 @@
 /// source  elementary
 fn aerial_row(y: f32, below: bool, rows: f32) -> f32 {
     let half = 0.5 * rows;
-    return (y * (half - 1.0) + 0.5 + select(0.0, half, below)) / rows;
+    return (min(y, 1.0) * (half - 1.0) + 0.5 + select(0.0, half, below)) / rows;
 }
 
 /// Where on a ray slices are dense: 0 at its start, for an eye in the lower air; of a higher eye's rays 1 at the end, when they meet the ground, and 2 in the middle.
@@ -78,6 +78,24 @@ fn aerial_slice(spacing: i32, t: f32, length: f32) -> f32 {
     return sqrt(share);
 }
 
+/// Optical depth of the air from an eye to the distance `t` from where the ray enters the air; the other arguments are those of `aerial_light`.
+///
+/// domain  t in [0, 2e6] m lin
+/// domain  length in [1, 2e6] m log
+/// domain  place.x in [0, 1] 1 lin
+/// domain  place.y in [0, 1] 1 lin
+/// domain  place.nu in [-1, 1] 1 lin
+/// range   [0, 1e6] 1
+/// error   0.02 rel of reference::air_tables::aerial_depth
+/// source  ours
+fn aerial_depth(depths: texture_2d<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace, t: f32, length: f32) -> vec3<f32> {
+    let reached = clamp(t, 0.0, length);
+    let slice = aerial_slice(aerial_spacing(eye, place.below), reached, length);
+    let size = vec2<f32>(textureDimensions(depths));
+    let at = vec2<f32>((slice * (size.x - 1.0) + 0.5) / size.x, aerial_row(place.y, place.below, size.y));
+    return textureSampleLevel(depths, linear, at, 0.0).rgb * (reached / air.top);
+}
+
 /// Light and transmittance of the air from an eye to the distance `t` from where the ray enters the air, for the direction's place in the tables of the eye and the whole length
 /// of the ray. Beyond the end it is that of the end.
 ///
@@ -102,7 +120,6 @@ fn aerial_light(light: texture_2d_array<f32>, depths: texture_2d<f32>, linear: s
     let far_share = between - f32(near);
     let smooth_light = mix(textureSampleLevel(light, linear, at, near, 0.0).rgb, textureSampleLevel(light, linear, at, near + 1, 0.0).rgb, far_share);
     let peaked = mix(textureSampleLevel(light, linear, at, slices + near, 0.0).rgb, textureSampleLevel(light, linear, at, slices + near + 1, 0.0).rgb, far_share);
-    let mean_depth = textureSampleLevel(depths, linear, vec2<f32>((between + 0.5) / f32(slices), row), 0.0).rgb;
     let share = reached / air.top;
-    return AirLight((smooth_light + peaked * peak_phase(air, place.nu)) * (share / eye.scale), exp(-mean_depth * share));
+    return AirLight((smooth_light + peaked * peak_phase(air, place.nu)) * (share / eye.scale), exp(-aerial_depth(depths, linear, air, eye, place, t, length)));
 }

@@ -179,5 +179,6 @@ fn air_phases(air: Air, nu: f32) -> Lanes {
 fn peak_phase(air: Air, nu: f32) -> f32 {
     let gap = 1.0 - air.peak_g;
     let base = max(gap * gap + (2.0 - 2.0 * nu) * air.peak_g, 1e-9);
-    return (air.peak_level + air.peak_square * (nu * nu)) * inverseSqrt(base) / base;
+    let over = inverseSqrt(base);
+    return (air.peak_level + air.peak_square * (nu * nu)) * (over * over * over);
 }

@@ -1,5 +1,5 @@
 The sky behind a host's own picture, and the air before it. Without AERIAL one triangle at the far plane that the host's depth test lets through where
-nothing stands; with AERIAL a pass over the whole target that reads the host's depth.
+nothing stands, and with SUN_DISC a square about the sun's disc; with AERIAL a pass over the whole target that reads the host's depth.
 
 #PROGRAM{ sky }#
 
@@ -25,8 +25,6 @@ struct SkyDraw {
     exposure: f32,
     // Of the sun at the top of the air.
     sun_irradiance: vec3<f32>,
-    // Angle between neighbouring pixels in the middle of the picture [rad].
-    pixel_angle: f32,
     // 1 for parallel rays.
     parallel: u32,
 }
@@ -36,26 +34,63 @@ struct SkyDraw {
 }#
 
 #VERTEX{
+    #CODE{
+#ifdef SUN_DISC
+#import veduta::atmosphere::sky_view::{SkyEye}
+#endif
+    }#
     #USE{ VARYING }#
     #CODE{
+#ifdef SUN_DISC
+@group(0) @binding(1) var<uniform> eye: SkyEye;
+#endif
+    }#
+    #CODE{
+#ifdef SUN_DISC
+// A square around the sun's disc: two triangles.
+@vertex
+fn cover(@builtin(vertex_index) index: u32) -> Corner {
+    let side = vec2<f32>(select(-1.0, 1.0, (index & 1u) == 1u), select(-1.0, 1.0, index == 2u || index == 3u || index == 5u));
+    let to_sun = eye.to_sun;
+    let ahead = dot(to_sun, draw_view.forward);
+    let aside = to_sun / max(ahead, 1e-6) - draw_view.ray_middle;
+    let width = dot(draw_view.ray_right, draw_view.ray_right);
+    let height = dot(draw_view.ray_up, draw_view.ray_up);
+    let middle = vec2<f32>(dot(aside, draw_view.ray_right) / width, dot(aside, draw_view.ray_up) / height);
+    // Away from the middle of the picture the disc is stretched.
+    let reach = tan(eye.sun_angular_radius) / max(ahead * ahead, 1e-6);
+    let extent = vec2<f32>(reach * inverseSqrt(width), reach * inverseSqrt(height)) * 1.1 + 0.02;
+    // Beyond the picture when the sun is behind the eye.
+    let clip = select(middle + side * extent, vec2<f32>(2.0), ahead <= 1e-3 || draw_view.parallel != 0u);
+    let ray = draw_view.ray_middle + clip.x * draw_view.ray_right + clip.y * draw_view.ray_up;
+    return Corner(vec4<f32>(clip, draw_view.far_depth, 1.0), ray);
+}
+#else
 @vertex
 fn cover(@builtin(vertex_index) index: u32) -> Corner {
     let clip = vec2<f32>(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u));
     let ray = draw_view.ray_middle + clip.x * draw_view.ray_right + clip.y * draw_view.ray_up;
     return Corner(vec4<f32>(clip, draw_view.far_depth, 1.0), ray);
 }
+#endif
     }#
 }#
 
 #FRAGMENT{
     #CODE{
 #import veduta::atmosphere::medium::{Air}
+#import veduta::atmosphere::sky_view::{SkyEye, SkyPlace, sky_place_inside, sky_place_outside, sky_radiance}
+#ifdef AERIAL
 #import veduta::atmosphere::ray::{AirLight, air_ray}
-#import veduta::atmosphere::columns::{sun_depth, sun_above_horizon}
-#import veduta::atmosphere::diffuse::{diffuse_moments, level_irradiance}
-#import veduta::atmosphere::sky_view::{SkyEye, sky_place, sky_radiance}
-#import veduta::atmosphere::aerial::{aerial_light}
+#import veduta::atmosphere::aerial::{aerial_light, aerial_depth}
 #import veduta::atmosphere::sun_disc::{sun_disc}
+#else
+#ifdef SUN_DISC
+#import veduta::atmosphere::ray::{air_ray}
+#import veduta::atmosphere::aerial::{aerial_depth}
+#import veduta::atmosphere::sun_disc::{sun_disc}
+#endif
+#endif
 #import veduta::tone_map::exponential::{exponential}
 #import veduta::post::srgb::{encode_srgb, decode_srgb}
 #import veduta::post::dither::{dither}
@@ -66,10 +101,8 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 @group(0) @binding(1) var<uniform> eye: SkyEye;
 @group(1) @binding(0) var linear: sampler;
 @group(1) @binding(1) var sky: texture_2d_array<f32>;
-@group(1) @binding(2) var columns: texture_2d_array<f32>;
-@group(1) @binding(3) var moments: texture_2d_array<f32>;
-@group(1) @binding(4) var light: texture_2d_array<f32>;
-@group(1) @binding(5) var depths: texture_2d<f32>;
+@group(1) @binding(2) var light: texture_2d_array<f32>;
+@group(1) @binding(3) var depths: texture_2d<f32>;
 #ifdef AERIAL
 @group(2) @binding(0) var depth: texture_depth_2d;
 #ifndef AERIAL_TARGETS
@@ -79,29 +112,40 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 
 override OUTPUT: i32 = 0;
 
-// Behind the host's things: the sky with the sun's disc, or the bare ground and the air before it.
-fn background(dir: vec3<f32>) -> vec3<f32> {
-    let place = sky_place(eye, dir);
-    if place.below {
-        let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
-        let front = aerial_light(light, depths, linear, air, eye, place, ray.length, ray.length);
-        let sun_mu = clamp(((air.ground_radius + ray.altitude) * ray.sun_mu + ray.length * ray.nu) / air.ground_radius, -1.0, 1.0);
-        let sun = max(sun_mu, 0.0) * exp(-sun_depth(columns, linear, air, 0.0, sun_mu)) * sun_above_horizon(air.ground_radius, 0.0, sun_mu, eye.sun_angular_radius);
-        let around = level_irradiance(diffuse_moments(moments, linear, air.top, 0.0, sun_mu));
-        var radiance = front.in_scatter;
-        if eye.altitude > eye.top {
-            radiance = sky_radiance(sky, linear, air, eye, place);
-        }
-        return radiance + front.transmittance * air.ground_albedo * (0.31830989 * (sun + around));
+// Whether the eye is above the air.
+override EYE_OUTSIDE: i32 = 0;
+
+fn place_of(dir: vec3<f32>) -> SkyPlace {
+    if EYE_OUTSIDE != 0 {
+        return sky_place_outside(eye, dir);
     }
-    var radiance = sky_radiance(sky, linear, air, eye, place);
-    if place.nu > cos(eye.sun_angular_radius + draw_view.pixel_angle) {
-        let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
-        let front = aerial_light(light, depths, linear, air, eye, place, ray.length, ray.length);
-        radiance += front.transmittance * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, draw_view.pixel_angle);
-    }
-    return radiance;
+    return sky_place_inside(eye, dir);
 }
+
+// Behind the host's things: the sky, or the bare ground and the air before it.
+fn background(dir: vec3<f32>) -> vec3<f32> {
+    return sky_radiance(sky, linear, air, eye, place_of(dir));
+}
+
+#ifdef AERIAL
+// Radiance of the sun's disc.
+fn disc(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
+    let place = place_of(dir);
+    let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
+    let seen = select(1.0, 0.0, place.below) * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle);
+    return seen * exp(-aerial_depth(depths, linear, air, eye, place, ray.length, ray.length));
+}
+#else
+#ifdef SUN_DISC
+// Radiance of the sun's disc.
+fn disc(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
+    let place = place_of(dir);
+    let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
+    let seen = select(1.0, 0.0, place.below) * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle);
+    return seen * exp(-aerial_depth(depths, linear, air, eye, place, ray.length, ray.length));
+}
+#endif
+#endif
 
 #ifdef AERIAL
 // Light and transmittance before what stands at a depth of the host's depth buffer.
@@ -112,7 +156,7 @@ fn before(ray_at: vec3<f32>, seen: f32) -> AirLight {
     }
     let distance = length(relative);
     let dir = relative / max(distance, 1e-20);
-    let place = sky_place(eye, dir);
+    let place = place_of(dir);
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
     if ray.length <= 0.0 {
         return AirLight(vec3<f32>(0.0), vec3<f32>(1.0));
@@ -142,10 +186,11 @@ struct Layers {
 
 @fragment
 fn draw(in: Corner) -> Layers {
+    let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
+    let pixel_angle = length(dpdx(dir));
     let seen = textureLoad(depth, vec2<i32>(in.position.xy), 0);
     if seen == draw_view.far_depth {
-        let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
-        return Layers(vec4<f32>(background(dir) * draw_view.sun_irradiance, 1.0), vec4<f32>(0.0, 0.0, 0.0, 1.0));
+        return Layers(vec4<f32>((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance, 1.0), vec4<f32>(0.0, 0.0, 0.0, 1.0));
     }
     let front = before(in.ray, seen);
     return Layers(vec4<f32>(front.in_scatter * draw_view.sun_irradiance, 1.0), vec4<f32>(front.transmittance, 1.0));
@@ -153,11 +198,12 @@ fn draw(in: Corner) -> Layers {
 #else
 @fragment
 fn draw(in: Corner) -> @location(0) vec4<f32> {
+    let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
+    let pixel_angle = length(dpdx(dir));
     let texel = vec2<i32>(in.position.xy);
     let seen = textureLoad(depth, texel, 0);
     if seen == draw_view.far_depth {
-        let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
-        return shown(background(dir) * draw_view.sun_irradiance, in.position.xy);
+        return shown((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance, in.position.xy);
     }
     let front = before(in.ray, seen);
     let radiance = front.in_scatter * draw_view.sun_irradiance + front.transmittance * textureLoad(picture, texel, 0).rgb;
@@ -168,7 +214,12 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
 @fragment
 fn draw(in: Corner) -> @location(0) vec4<f32> {
     let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
-    return shown(background(dir) * draw_view.sun_irradiance, in.position.xy);
+#ifdef SUN_DISC
+    let radiance = background(dir) + disc(dir, length(dpdx(dir)));
+#else
+    let radiance = background(dir);
+#endif
+    return shown(radiance * draw_view.sun_irradiance, in.position.xy);
 }
 #endif
     }#

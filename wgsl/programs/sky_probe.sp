@@ -54,7 +54,7 @@ fn probe(@builtin(global_invocation_id) id: vec3<u32>) {
     let t = rays[id.x].distance - ray.from_eye;
     let place = sky_place(eye, dir);
     var found = aerial_light(light, depths, linear, air, eye, place, t, ray.length);
-    if t >= ray.length && (!place.below || eye.altitude > eye.top) {
+    if t >= ray.length {
         found.in_scatter = sky_radiance(sky, linear, air, eye, place);
     }
     results[id.x] = ProbeLight(found.in_scatter, found.transmittance);

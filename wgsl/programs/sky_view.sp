@@ -6,12 +6,15 @@ The table of the sky as one eye sees it: every direction that leaves the air. Ma
     #CODE{
 #import veduta::atmosphere::medium::{Air}
 #import veduta::atmosphere::ray::{air_ray}
-#import veduta::atmosphere::columns::{texel_coordinates}
+#import veduta::atmosphere::columns::{texel_coordinates, sun_depth, sun_above_horizon}
+#import veduta::atmosphere::diffuse::{diffuse_moments, level_irradiance}
 #import veduta::atmosphere::scatter::{scatter_along}
 #import veduta::atmosphere::sky_view::{SkyEye, sky_direction, sky_rows}
 
 override SKY_STEPS: i32 = 12;
 override ALL_ORDERS: i32 = 1;
+// Whether directions below the horizon show the ground too.
+override SKY_GROUND: i32 = 0;
 
 @group(0) @binding(0) var<uniform> air: Air;
 @group(0) @binding(1) var<uniform> eye: SkyEye;
@@ -32,7 +35,13 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     let place = texel_coordinates(vec2<f32>(f32(id.x), row.x), vec2<f32>(f32(size.x), row.y));
     let dir = sky_direction(eye, place, below);
     var ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
-    let light = scatter_along(columns, moments, linear, air, ray, eye.sun_angular_radius, ALL_ORDERS != 0, SKY_STEPS);
+    var light = scatter_along(columns, moments, linear, air, ray, eye.sun_angular_radius, ALL_ORDERS != 0, SKY_STEPS);
+    if SKY_GROUND != 0 && ray.meets_ground != 0u {
+        let sun_mu = clamp(((air.ground_radius + ray.altitude) * ray.sun_mu + ray.length * ray.nu) / air.ground_radius, -1.0, 1.0);
+        let sun = max(sun_mu, 0.0) * exp(-sun_depth(columns, linear, air, 0.0, sun_mu)) * sun_above_horizon(air.ground_radius, 0.0, sun_mu, eye.sun_angular_radius);
+        let around = level_irradiance(diffuse_moments(moments, linear, air.top, 0.0, sun_mu));
+        light.smooth_light += light.transmittance * air.ground_albedo * (0.31830989 * (sun + around));
+    }
     textureStore(sky, id.xy, 0, vec4<f32>(light.smooth_light * eye.scale, 1.0));
     textureStore(sky, id.xy, 1, vec4<f32>(light.peaked_light * eye.scale, 1.0));
 }

@@ -9,4 +9,5 @@ pub mod lint;
 pub mod list;
 pub mod probe;
 pub mod render;
+pub mod sky;
 pub mod stress;

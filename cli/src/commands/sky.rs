@@ -1,0 +1,198 @@
+//! `veduta sky`: pictures of an atmosphere from any altitude, one for each height of the sun.
+
+use std::path::PathBuf;
+
+use veduta::atmosphere::{Sky, SkyComposition, SkyOptions};
+use veduta::glam::{DVec3, Vec3};
+use veduta::view::direction;
+use veduta::{Light, Preset, Targets, View, WorldPos};
+
+use super::probe::atmosphere;
+use crate::error::CliError;
+use crate::image::{check_folder, check_output, write_exr, write_png};
+use crate::metrics::Picture;
+use crate::render::Size;
+
+/// Arguments of `veduta sky`.
+#[derive(Debug, Clone, clap::Args)]
+pub struct SkyArgs {
+    /// A shipped atmosphere or a .ron file
+    #[arg(long, value_name = "NAME|FILE", default_value = "earth")]
+    pub atmosphere: String,
+    /// The preset of the tables
+    #[arg(long, value_name = "NAME", default_value = "high")]
+    pub preset: String,
+    /// Altitude of the eye in metres, 0 to 1e9
+    #[arg(long, default_value_t = 2.0, allow_negative_numbers = true)]
+    pub altitude: f64,
+    /// Heights of the sun above the horizon in degrees, divided by commas: a picture each, side by side
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        value_delimiter = ',',
+        default_value = "30",
+        allow_hyphen_values = true
+    )]
+    pub sun_height: Vec<f64>,
+    /// Azimuth of the sun in degrees, clockwise from -z
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub sun_azimuth: f64,
+    /// Direction of the view in degrees, clockwise from -z
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub yaw: f64,
+    /// Elevation of the view in degrees
+    #[arg(long, default_value_t = 15.0, allow_negative_numbers = true)]
+    pub pitch: f64,
+    /// Vertical field of view in degrees, 0.01 to 170
+    #[arg(long, default_value_t = 60.0)]
+    pub fov: f64,
+    /// Width and height of each picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "256x144")]
+    pub size: Size,
+    /// Factor on radiance before the tone map; found from each picture when left out
+    #[arg(long)]
+    pub exposure: Option<f64>,
+    /// The picture, .png or .exr (radiance for a sun of irradiance 1, not exposed)
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+/// The exposure with which a bright part of the picture (the 80th centile of the brightest channel) is shown at a displayed 0.75.
+fn exposure_of(rgb: &[f32]) -> f64 {
+    let mut brightest: Vec<f32> = rgb
+        .chunks_exact(3)
+        .map(|p| p[0].max(p[1]).max(p[2]))
+        .filter(|v| *v > 0.0)
+        .collect();
+    if brightest.is_empty() {
+        return 1.0;
+    }
+    brightest.sort_by(f32::total_cmp);
+    let bright = brightest[(brightest.len() - 1) * 8 / 10];
+    // 1 - exp(-x) is about 0.52 in linear light, which is displayed at 0.75.
+    0.74 / f64::from(bright.max(1e-20))
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`CliError`] for arguments out of their domains and files that cannot be written; what the library reports.
+pub fn run(args: &SkyArgs) -> Result<(), CliError> {
+    let exr = args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    check_output("--out", &args.out, if exr { "exr" } else { "png" })?;
+    check_folder(&args.out)?;
+    let within = |name: &str, value: f64, low: f64, high: f64| {
+        if (low..=high).contains(&value) {
+            return Ok(());
+        }
+        Err(CliError::argument(
+            name,
+            value.to_string(),
+            format!("in [{low}, {high}]"),
+        ))
+    };
+    within("--altitude", args.altitude, 0.0, 1e9)?;
+    within("--fov", args.fov, 0.01, 170.0)?;
+    within("--pitch", args.pitch, -90.0, 90.0)?;
+    within("--yaw", args.yaw, -360.0, 360.0)?;
+    within("--sun-azimuth", args.sun_azimuth, -360.0, 360.0)?;
+    for height in &args.sun_height {
+        within("--sun-height", *height, -90.0, 90.0)?;
+    }
+    if let Some(exposure) = args.exposure {
+        within("--exposure", exposure, 0.0, 1e12)?;
+    }
+    let gpu = veduta::device::shared()?;
+    let options = SkyOptions {
+        preset: Preset::Named(args.preset.clone().into()),
+        atmosphere: atmosphere(&args.atmosphere)?,
+        composition: SkyComposition::Background,
+    };
+    let format = veduta::wgpu::TextureFormat::Rgba32Float;
+    let targets = Targets {
+        color_format: format,
+        ..Default::default()
+    };
+    let mut sky = Sky::new(&gpu.device, veduta::programs(), &targets, &options)?;
+    let (width, height) = (args.size.width, args.size.height);
+    let texture = gpu.device.create_texture(&veduta::wgpu::TextureDescriptor {
+        label: Some("picture"),
+        size: veduta::wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: veduta::wgpu::TextureDimension::D2,
+        format,
+        usage: veduta::wgpu::TextureUsages::RENDER_ATTACHMENT
+            | veduta::wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    });
+    let target = texture.create_view(&Default::default());
+    let mut pictures = Vec::new();
+    for sun_height in &args.sun_height {
+        let to_sun = direction(sun_height.to_radians(), args.sun_azimuth.to_radians());
+        let mut view = View {
+            eye: WorldPos::from_metres(DVec3::new(0.0, args.altitude, 0.0)),
+            sun: Light {
+                to_light: to_sun.as_vec3(),
+                irradiance: Vec3::ONE,
+                angular_radius: options.atmosphere.sun.angular_radius as f32,
+            },
+            ..Default::default()
+        };
+        view.look(
+            args.yaw.to_radians(),
+            args.pitch.to_radians(),
+            args.fov.to_radians() as f32,
+            width as f32 / height as f32,
+        );
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let _ = sky.prepare(&gpu.queue, &mut encoder, &view)?;
+        {
+            let mut pass = encoder.begin_render_pass(&veduta::wgpu::RenderPassDescriptor {
+                color_attachments: &[Some(veduta::wgpu::RenderPassColorAttachment {
+                    view: &target,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: Default::default(),
+                })],
+                ..Default::default()
+            });
+            let _ = sky.composite(&mut pass)?;
+        }
+        gpu.queue.submit([encoder.finish()]);
+        let bytes = gpu.read_texture(&texture)?;
+        let rgb: Vec<f32> = bytes
+            .chunks_exact(16)
+            .flat_map(|p| {
+                [0, 4, 8].map(|k| f32::from_le_bytes([p[k], p[k + 1], p[k + 2], p[k + 3]]))
+            })
+            .collect();
+        pictures.push(rgb);
+    }
+    let (w, h) = (width as usize, height as usize);
+    let count = pictures.len();
+    if exr {
+        return write_exr(&args.out, width * count as u32, height, &beside(&pictures, w, h));
+    }
+    let shown = pictures
+        .into_iter()
+        .map(|rgb| {
+            let exposure = args.exposure.unwrap_or_else(|| exposure_of(&rgb));
+            Ok(Picture::new(w, h, rgb)?.display(exposure))
+        })
+        .collect::<Result<Vec<Vec<u8>>, CliError>>()?;
+    write_png(&args.out, width * count as u32, height, &beside(&shown, w, h))
+}
+
+/// Pictures of one size side by side.
+fn beside<T: Copy>(pictures: &[Vec<T>], width: usize, height: usize) -> Vec<T> {
+    (0..height)
+        .flat_map(|y| pictures.iter().map(move |p| &p[3 * width * y..3 * width * (y + 1)]))
+        .flatten()
+        .copied()
+        .collect()
+}

@@ -1,0 +1,427 @@
+//! The sky behind a host's own scene and the air before it.
+
+use glam::{Vec3, Vec4};
+
+use crate::error::Error;
+use crate::landscape::{Depth, Projection, Resources, Targets, Work};
+use crate::program::{Pipeline, PipelineOptions, ProgramSet, ReadyPipeline};
+use crate::programs::blocks::SkyDraw as DrawBlock;
+use crate::settings::{Preset, Settings};
+use crate::view::View;
+
+use super::Atmosphere;
+use super::tables::{Eye, SkyQuality, SkyTables, bind_groups};
+
+/// How the sky comes together with what the host has drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum SkyComposition {
+    /// The sky alone, at the far plane: drawn in the host's own pass after its opaque things, where its depth test lets it through.
+    #[default]
+    Background,
+    /// Sky and air in a pass of their own that reads the host's picture (scene radiance) and depth and writes the whole target.
+    OverPicture,
+    /// As `OverPicture`, but light and transmittance go into two targets of float formats, for a host that puts them together itself:
+    /// picture * transmittance + light. The picture is not read.
+    TwoTargets,
+}
+
+/// Choices that are made once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SkyOptions {
+    /// The quality of the tables.
+    pub preset: Preset,
+    /// The air.
+    pub atmosphere: Atmosphere,
+    /// How the sky comes together with what the host has drawn.
+    pub composition: SkyComposition,
+}
+
+impl Default for SkyOptions {
+    /// The Earth behind the host's things, with the preset `high`.
+    fn default() -> Self {
+        SkyOptions {
+            preset: Preset::High,
+            atmosphere: Atmosphere::default(),
+            composition: SkyComposition::default(),
+        }
+    }
+}
+
+/// Draws the sky behind a host's scene, from any altitude, and the air before it.
+///
+/// ```no_run
+/// # fn frame(device: &wgpu::Device, queue: &wgpu::Queue, encoder: &mut wgpu::CommandEncoder, target: &wgpu::TextureView, depth: &wgpu::TextureView)
+/// # -> Result<(), veduta::Error> {
+/// use veduta::atmosphere::{Sky, SkyOptions};
+/// let targets = veduta::Targets { depth_format: Some(wgpu::TextureFormat::Depth32Float), ..Default::default() };
+/// let mut sky = Sky::new(device, veduta::programs(), &targets, &SkyOptions::default())?;
+/// // Every frame: tables are made anew only when the sun or the eye's altitude has changed.
+/// let work = sky.prepare(queue, encoder, &veduta::View::default())?;
+/// println!("{} tables", work.bakes);
+/// let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+///     color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+///         view: target, depth_slice: None, resolve_target: None, ops: wgpu::Operations::default(),
+///     })],
+///     depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+///         view: depth, depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }), stencil_ops: None,
+///     }),
+///     ..Default::default()
+/// });
+/// // The host draws its own things here.
+/// let _ = sky.composite(&mut pass)?;
+/// # Ok(()) }
+/// ```
+#[derive(Debug)]
+pub struct Sky {
+    tables: SkyTables,
+    targets: Targets,
+    composition: SkyComposition,
+    /// For an eye within the air, and for one above it.
+    pipelines: [Pass; 2],
+    outside: bool,
+    layouts: Vec<wgpu::BindGroupLayout>,
+    draw: wgpu::Buffer,
+    draw_bytes: Vec<u8>,
+    host: Option<wgpu::BindGroup>,
+}
+
+/// A pipeline with what is bound to it.
+#[derive(Debug)]
+struct Layer {
+    pipeline: wgpu::RenderPipeline,
+    groups: Vec<wgpu::BindGroup>,
+}
+
+/// What is drawn: the sky, and over it the sun's disc in a square of its own, so that no other pixel pays for it.
+#[derive(Debug)]
+struct Pass {
+    sky: Layer,
+    disc: Option<Layer>,
+}
+
+impl Sky {
+    /// Builds tables and pipelines.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for targets that it cannot draw into: integer or depth formats, a number of samples that is none, more than
+    /// one sample with a composition that reads the host's depth, a format for `TwoTargets` that is not float; the faults of
+    /// [`Settings::resolve`] and [`SkyTables::new`].
+    pub fn new(
+        device: &wgpu::Device,
+        programs: &ProgramSet,
+        targets: &Targets,
+        options: &SkyOptions,
+    ) -> Result<Sky, Error> {
+        targets.check()?;
+        let reads_depth = options.composition != SkyComposition::Background;
+        if reads_depth && targets.sample_count != 1 {
+            return Err(Error::OutOfDomain {
+                name: "targets.sample_count".to_owned(),
+                value: targets.sample_count.to_string(),
+                domain: "1 for a sky that is composed with the host's depth".to_owned(),
+            });
+        }
+        let output = crate::landscape::output_of(targets.color_format)?;
+        if options.composition == SkyComposition::TwoTargets && output != 2.0 {
+            return Err(Error::OutOfDomain {
+                name: "targets.color_format".to_owned(),
+                value: format!("{:?}", targets.color_format),
+                domain: "a float format, since light and transmittance are not for display".to_owned(),
+            });
+        }
+        let settings = Settings::resolve(programs, &options.preset, None, &[])?;
+        let quality = SkyQuality::of(&settings);
+        let tables = SkyTables::with_ground(device, programs, &options.atmosphere, &quality)?;
+        let mut features = options.atmosphere.features().to_vec();
+        match options.composition {
+            SkyComposition::Background => {}
+            SkyComposition::OverPicture => features.push("AERIAL"),
+            SkyComposition::TwoTargets => features.extend(["AERIAL", "AERIAL_TARGETS"]),
+        }
+        let draw = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("veduta sky view"),
+            size: DrawBlock::SIZE as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let depth_stencil = targets
+            .depth_format
+            .filter(|_| !reads_depth)
+            .map(|format| wgpu::DepthStencilState {
+                format,
+                depth_write_enabled: Some(false),
+                depth_compare: Some(match targets.depth {
+                    Depth::Normal => wgpu::CompareFunction::LessEqual,
+                    Depth::Reversed | Depth::ReversedInfinite => {
+                        wgpu::CompareFunction::GreaterEqual
+                    }
+                }),
+                stencil: Default::default(),
+                bias: Default::default(),
+            });
+        let format = Some(targets.color_format.into());
+        let both = [format.clone(), format];
+        let count = 1 + usize::from(options.composition == SkyComposition::TwoTargets);
+        let mut layouts = Vec::new();
+        let mut pass = |outside: bool| -> Result<Pass, Error> {
+            let mut layer = |features: &[&str]| {
+                let program = programs.get("sky", features)?;
+                let constants: Vec<(&str, f64)> = program
+                    .overrides
+                    .iter()
+                    .map(|o| {
+                        let value = if o.name == "OUTPUT" {
+                            output
+                        } else {
+                            f64::from(u8::from(outside))
+                        };
+                        (o.name.as_ref(), value)
+                    })
+                    .collect();
+                let ReadyPipeline {
+                    pipeline,
+                    bind_group_layouts,
+                } = program.pipeline(
+                    device,
+                    &PipelineOptions {
+                        targets: &both[..count],
+                        depth_stencil: depth_stencil.clone(),
+                        sample_count: targets.sample_count,
+                        constants: &constants,
+                        ..Default::default()
+                    },
+                )?;
+                let Pipeline::Render(pipeline) = pipeline else {
+                    return Err(Error::MissingStage {
+                        program: "sky".to_owned(),
+                    });
+                };
+                // A variant has only the bindings that it reads.
+                let has = |group: u32, binding: u32| {
+                    program
+                        .bindings
+                        .iter()
+                        .any(|b| b.group == group && b.binding == binding)
+                };
+                let view = wgpu::BindingResource::TextureView;
+                let mut first = vec![
+                    (0, tables.air().as_entire_binding()),
+                    (1, tables.eye().as_entire_binding()),
+                    (2, draw.as_entire_binding()),
+                ];
+                first.retain(|(binding, _)| has(0, *binding));
+                let mut second = vec![
+                    (0, wgpu::BindingResource::Sampler(tables.sampler())),
+                    (1, view(tables.sky())),
+                    (2, view(tables.aerial())),
+                    (3, view(tables.aerial_depths())),
+                ];
+                second.retain(|(binding, _)| has(1, *binding));
+                let groups = bind_groups(
+                    device,
+                    "veduta sky",
+                    &bind_group_layouts[..2],
+                    &[&first, &second],
+                );
+                if bind_group_layouts.len() > 2 {
+                    layouts = bind_group_layouts;
+                }
+                Ok(Layer { pipeline, groups })
+            };
+            let sky = layer(&features)?;
+            let disc = if reads_depth || targets.projection == Projection::Orthographic {
+                None
+            } else {
+                let mut features = features.clone();
+                features.push("SUN_DISC");
+                Some(layer(&features)?)
+            };
+            Ok(Pass { sky, disc })
+        };
+        let pipelines = [pass(false)?, pass(true)?];
+        Ok(Sky {
+            tables,
+            targets: *targets,
+            composition: options.composition,
+            pipelines,
+            outside: false,
+            layouts,
+            draw,
+            draw_bytes: Vec::new(),
+            host: None,
+        })
+    }
+
+    /// The tables.
+    pub fn tables(&self) -> &SkyTables {
+        &self.tables
+    }
+
+    /// The tables, to change their air.
+    pub fn tables_mut(&mut self) -> &mut SkyTables {
+        &mut self.tables
+    }
+
+    /// What it keeps on the device.
+    pub fn resources(&self) -> Resources {
+        let tables = self.tables.resources();
+        let layers = || {
+            self.pipelines
+                .iter()
+                .flat_map(|pass| [Some(&pass.sky), pass.disc.as_ref()])
+                .flatten()
+        };
+        Resources {
+            pipelines: tables.pipelines + layers().count() as u32,
+            bind_groups: tables.bind_groups
+                + layers().map(|l| l.groups.len() as u32).sum::<u32>()
+                + u32::from(self.host.is_some()),
+            bindings: tables.bindings + 7 * layers().count() as u32,
+            buffers: tables.buffers + 1,
+            buffer_bytes: tables.buffer_bytes + self.draw.size(),
+            ..tables
+        }
+    }
+
+    /// Tells which pictures of the host [`Sky::composite`] reads: its depth, and for `OverPicture` its scene radiance. Again after each change of size.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for a sky that reads none, and for a missing picture.
+    pub fn set_host(
+        &mut self,
+        device: &wgpu::Device,
+        depth: &wgpu::TextureView,
+        picture: Option<&wgpu::TextureView>,
+    ) -> Result<(), Error> {
+        let fault = |name: &str, value: &str, domain: &str| {
+            Err(Error::OutOfDomain {
+                name: name.to_owned(),
+                value: value.to_owned(),
+                domain: domain.to_owned(),
+            })
+        };
+        let mut bound = vec![(0, wgpu::BindingResource::TextureView(depth))];
+        match (self.composition, picture) {
+            (SkyComposition::Background, _) => {
+                return fault(
+                    "composition",
+                    "Background",
+                    "one that reads the host's depth",
+                );
+            }
+            (SkyComposition::OverPicture, None) => {
+                return fault("picture", "missing", "the host's scene radiance");
+            }
+            (SkyComposition::OverPicture, Some(picture)) => {
+                bound.push((1, wgpu::BindingResource::TextureView(picture)));
+            }
+            (SkyComposition::TwoTargets, _) => {}
+        }
+        self.host = bind_groups(device, "veduta host", self.layouts.get(2..).unwrap_or_default(), &[&bound]).pop();
+        Ok(())
+    }
+
+    /// Uploads what has changed and records the tables that have to be made anew. The sun's irradiance is the view's times the colour of the
+    /// atmosphere's sun; its angular radius is the view's.
+    ///
+    /// # Errors
+    /// As [`View::check`] and [`SkyTables::prepare`]; [`Error::OutOfDomain`] for a projection that does not fit the targets.
+    pub fn prepare(
+        &mut self,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        view: &View,
+    ) -> Result<Work, Error> {
+        view.check()?;
+        let eye = Eye {
+            altitude: view.eye.altitude().max(0.0),
+            to_sun: view.sun.to_light.as_dvec3().normalize().to_array(),
+            sun_angular_radius: f64::from(view.sun.angular_radius),
+        };
+        let block = self.draw_block(view)?;
+        self.outside = eye.altitude as f32 > self.tables.atmosphere().thickness as f32;
+        let mut work = self.tables.prepare(queue, encoder, &eye)?;
+        let bytes = block.to_bytes().to_vec();
+        if bytes != self.draw_bytes {
+            queue.write_buffer(&self.draw, 0, &bytes);
+            work.writes += 1;
+            work.bytes += bytes.len() as u64;
+            self.draw_bytes = bytes;
+        }
+        Ok(work)
+    }
+
+    fn draw_block(&self, view: &View) -> Result<DrawBlock, Error> {
+        let parallel = self.targets.projection == Projection::Orthographic;
+        let projection = view.projection;
+        let (scale, offset) = (projection.z_axis.z, projection.w_axis.z);
+        let rotate = |v: Vec3| view.world_from_view.transform_vector3(v);
+        let [middle, right, up] = if parallel {
+            let inverse = projection.inverse();
+            let at = |x: f32, y: f32| {
+                let p = inverse * Vec4::new(x, y, 0.0, 1.0);
+                let p = p.truncate() / p.w;
+                Vec3::new(p.x, p.y, 0.0)
+            };
+            let middle = at(0.0, 0.0);
+            let all = [middle, at(1.0, 0.0) - middle, at(0.0, 1.0) - middle];
+            if projection.z_axis.w != 0.0 || scale == 0.0 || !all.iter().all(|v| v.is_finite()) {
+                return Err(Error::OutOfDomain {
+                    name: "view.projection".to_owned(),
+                    value: format!("{:?}", projection.to_cols_array()),
+                    domain: "an orthographic projection, as the targets say".to_owned(),
+                });
+            }
+            all.map(rotate)
+        } else {
+            view.rays()?
+        };
+        let colour = self.tables.atmosphere().sun.colour;
+        let colour = Vec3::from_array(colour.map(|c| c as f32));
+        Ok(DrawBlock {
+            ray_middle: middle.to_array(),
+            far_depth: match self.targets.depth {
+                Depth::Normal => 1.0,
+                Depth::Reversed | Depth::ReversedInfinite => 0.0,
+            },
+            ray_right: right.to_array(),
+            depth_numerator: if parallel { -1.0 / scale } else { offset },
+            ray_up: up.to_array(),
+            depth_offset: if parallel { offset } else { scale },
+            forward: rotate(Vec3::NEG_Z).normalize_or(Vec3::NEG_Z).to_array(),
+            exposure: view.exposure,
+            sun_irradiance: (view.sun.irradiance * colour).to_array(),
+            parallel: u32::from(parallel),
+            ..DrawBlock::ZERO
+        })
+    }
+
+    /// Draws into the host's pass, or into one of its own that [`Sky::set_host`] fits.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] when the host's depth has not been set for a sky that reads it.
+    pub fn composite(&self, pass: &mut wgpu::RenderPass<'_>) -> Result<Work, Error> {
+        if self.composition != SkyComposition::Background && self.host.is_none() {
+            return Err(Error::OutOfDomain {
+                name: "host".to_owned(),
+                value: "not set".to_owned(),
+                domain: "what `Sky::set_host` has been given".to_owned(),
+            });
+        }
+        let Pass { sky, disc } = &self.pipelines[usize::from(self.outside)];
+        let mut work = Work::default();
+        for (layer, vertices) in [(Some(sky), 3), (disc.as_ref(), 6)] {
+            let Some(layer) = layer else {
+                continue;
+            };
+            pass.set_pipeline(&layer.pipeline);
+            for (group, index) in layer.groups.iter().chain(&self.host).zip(0..) {
+                pass.set_bind_group(index, group, &[]);
+            }
+            pass.draw(0..vertices, 0..1);
+            work.draws += 1;
+        }
+        Ok(work)
+    }
+}
