@@ -5,6 +5,7 @@
 //! What they stand on: [`monte_carlo`], [`parallel`].
 
 pub mod air_ray;
+pub mod air_tables;
 pub mod atmosphere;
 pub mod clouds;
 pub mod fractal;

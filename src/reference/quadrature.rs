@@ -56,6 +56,33 @@ impl Rule {
     }
 }
 
+/// Node and weight on [0, 1] number `i` of a Gauss-Legendre rule, from the lowest.
+fn gauss_point(order: usize, i: i32) -> [f64; 2] {
+    let (x, w) = gauss_legendre(order)[order - 1 - i.clamp(0, order as i32 - 1) as usize];
+    [0.5 + 0.5 * x, 0.5 * w]
+}
+
+/// Node and weight number `i` on [0, 1] of the Gauss-Legendre rule with four points.
+pub fn gauss_four(i: i32) -> [f64; 2] {
+    gauss_point(4, i)
+}
+
+/// Node and weight number `i` on [0, 1] of the Gauss-Legendre rule with five points.
+pub fn gauss_five(i: i32) -> [f64; 2] {
+    gauss_point(5, i)
+}
+
+/// Node and weight number `i` of the midpoint rule with `count` points after the change of variable t = (x^2 (3 - 2 x))^2; the
+/// last weight makes their sum 1.
+pub fn squared_node(count: i32, i: i32) -> [f64; 2] {
+    let n = f64::from(count.max(1));
+    let x = (f64::from(i) + 0.5) / n;
+    let step = x * x * (3.0 - 2.0 * x);
+    let slope = 2.0 * step * 6.0 * x * (1.0 - x);
+    let surplus = if i == count - 1 { 0.5 / (n * n) } else { 0.0 };
+    [step * step, slope / n - surplus]
+}
+
 /// A point of the pair of rules with 7 and 15 points that share their nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KronrodPoint {

@@ -20,6 +20,7 @@ mod probe;
 mod reference;
 mod simplex;
 mod sweep;
+mod tables;
 mod terrain;
 mod tone_map;
 mod validators;

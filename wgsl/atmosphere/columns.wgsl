@@ -7,9 +7,13 @@
 //! exponential are not divided by a density. Paths end at the top; the table has none that meet the ground.
 #define_import_path veduta::atmosphere::columns
 
-#import veduta::atmosphere::medium::{Air, Lanes, air_densities, air_extinction}
+#import veduta::atmosphere::medium::{Air, FourLayers, Lanes, air_extinction}
 #import veduta::planet::shell::{altitude_along, top_distance}
+#import veduta::math::gauss::{gauss_four}
 #import veduta::math::squared::{squared_node}
+
+/// Points of the quadrature of exponential layers.
+const COLUMN_STEPS: i32 = 24;
 
 /// Zenith cosine of the horizon of the ground sphere, seen from altitude `h`.
 ///
@@ -17,6 +21,7 @@
 /// domain  h in [0, 1e6] m lin
 /// range   [-1, 0] 1
 /// error   2e-7 abs of reference::air_tables::horizon_cosine
+/// outside undefined
 /// source  elementary
 fn horizon_cosine(ground_radius: f32, h: f32) -> f32 {
     let above = max(h, 0.0);
@@ -27,7 +32,7 @@ fn horizon_cosine(ground_radius: f32, h: f32) -> f32 {
 ///
 /// domain  ground_radius in [3e6, 1e8] m log
 /// domain  top in [5e4, 2e5] m lin
-/// domain  h in [0, 5e4] m lin
+/// domain  h in [0, top] m lin
 /// domain  mu in [-1, 1] 1 lin
 /// range   [0, 1] 1
 /// error   4e-4 abs of reference::air_tables::column_coordinates
@@ -38,13 +43,14 @@ fn column_coordinates(ground_radius: f32, top: f32, h: f32, mu: f32) -> vec2<f32
     return vec2<f32>(x, sqrt(clamp(h / top, 0.0, 1.0)));
 }
 
-/// Altitude [m] and zenith cosine of coordinates in the table of columns: the inverse of `column_coordinates`.
+/// Altitude [m] and zenith cosine of coordinates in the table of columns: the inverse of `column_coordinates`. The error is that of the altitude.
 ///
 /// domain  ground_radius in [3e6, 1e8] m log
 /// domain  top in [5e4, 2e5] m lin
 /// domain  place in [0, 1] 1 lin
 /// range   [-1, 2e5] 1
-/// error   3e-7 rel of reference::air_tables::column_place
+/// error   0.02 abs of reference::air_tables::column_place
+/// outside undefined
 /// source  as column_coordinates
 fn column_place(ground_radius: f32, top: f32, place: vec2<f32>) -> vec2<f32> {
     let h = top * place.y * place.y;
@@ -55,10 +61,11 @@ fn column_place(ground_radius: f32, top: f32, place: vec2<f32>) -> vec2<f32> {
 /// What the columns of the table are relative to: densities at the lowest point of the path from altitude `h` along zenith
 /// cosine `mu` for exponential lanes, 1 for others.
 ///
-/// domain  h in [0, 1e5] m lin
+/// domain  h in [0, air.top] m lin
 /// domain  mu in [-1, 1] 1 lin
 /// range   [0, 1] 1
-/// error   2e-4 abs of reference::air_tables::column_scale
+/// error   1e-5 abs of reference::air_tables::column_scale
+/// outside undefined
 /// source  ours
 fn column_scale(air: Air, h: f32, mu: f32) -> Lanes {
     let below = (air.ground_radius + h) * mu * mu / (1.0 + sqrt(max((1.0 - mu) * (1.0 + mu), 0.0)));
@@ -70,32 +77,82 @@ fn column_scale(air: Air, h: f32, mu: f32) -> Lanes {
     return scale;
 }
 
-/// Columns of all lanes [m] from altitude `h` along zenith cosine `mu` to the top of the air, by a quadrature
-/// that is dense at the lowest point; the ground does not end the path.
+/// Columns of four layers that are not exponential, over the distance `far` of a ray that does not fall; 0 for others. Between the altitudes
+/// where densities bend they are smooth along the ray.
 ///
-/// domain  h in [0, 1e5] m lin
-/// domain  mu in [0, 1] 1 lin
-/// range   [0, 1e7] m
-/// error   1e-3 rel of reference::air_tables::columns_to_top
-/// source  veduta::math::squared
-fn columns_to_top(air: Air, h: f32, mu: f32) -> Lanes {
-    let end = top_distance(air.ground_radius, air.top, h, mu);
-    let lowest = clamp(-(air.ground_radius + h) * mu, 0.0, end);
-    var sum = Lanes(vec4<f32>(0.0), vec4<f32>(0.0));
-    for (var i = 0; i < 32; i++) {
-        let node = squared_node(32, i);
-        let share = node.x;
-        let weight = node.y;
-        let beyond = air_densities(air, altitude_along(air.ground_radius, h, mu, lowest + (end - lowest) * share));
-        sum.low += beyond.low * (weight * (end - lowest));
-        sum.high += beyond.high * (weight * (end - lowest));
-        if lowest > 0.0 {
-            let before = air_densities(air, altitude_along(air.ground_radius, h, mu, lowest - lowest * share));
-            sum.low += before.low * (weight * lowest);
-            sum.high += before.high * (weight * lowest);
+/// internal
+fn ramp_columns(layers: FourLayers, ground_radius: f32, h: f32, mu: f32, far: f32) -> vec4<f32> {
+    let rise = max(layers.rise, vec4<f32>(1e-30));
+    let sink = max(-layers.sink, vec4<f32>(1e-30));
+    var edges = array<vec4<f32>, 4>(
+        -layers.rise_offset / rise,
+        (1.0 - layers.rise_offset) / rise,
+        (layers.sink_offset - 1.0) / sink,
+        layers.sink_offset / sink,
+    );
+    let along = (ground_radius + h) * mu;
+    for (var i = 0; i < 4; i++) {
+        let level = min(edges[i], vec4<f32>(1e9));
+        let gain = max(level - h, vec4<f32>(0.0)) * (2.0 * ground_radius + level + h);
+        edges[i] = min(gain / max(sqrt(along * along + gain) + along, vec4<f32>(1e-20)), vec4<f32>(far));
+    }
+    var sum = max(edges[2] - edges[1], vec4<f32>(0.0));
+    for (var side = 0; side < 2; side++) {
+        let from_edge = edges[2 * side];
+        let long = edges[2 * side + 1] - from_edge;
+        for (var i = 0; i < 4; i++) {
+            let node = gauss_four(i);
+            let t = from_edge + long * node.x;
+            let gain = t * (t + 2.0 * along);
+            let r = ground_radius + h;
+            let altitude = h + gain / (r + sqrt(r * r + gain));
+            let ramps = min(layers.rise * altitude + layers.rise_offset, layers.sink * altitude + layers.sink_offset);
+            sum += clamp(ramps, vec4<f32>(0.0), vec4<f32>(1.0)) * (long * node.y);
         }
     }
+    return select(vec4<f32>(0.0), sum, layers.rise > vec4<f32>(0.0));
+}
+
+/// Columns of all lanes [m] over the distance `far` of a ray that does not fall.
+///
+/// internal
+fn outward_columns(air: Air, h: f32, mu: f32, far: f32) -> Lanes {
+    var sum = Lanes(vec4<f32>(0.0), vec4<f32>(0.0));
+    for (var i = 0; i < COLUMN_STEPS; i++) {
+        let node = squared_node(COLUMN_STEPS, i);
+        let altitude = altitude_along(air.ground_radius, h, mu, far * node.x);
+        sum.low += exp(air.low.fall * altitude) * (node.y * far);
+#ifdef AIR_EIGHT_LANES
+        sum.high += exp(air.high.fall * altitude) * (node.y * far);
+#endif
+    }
+    let none = vec4<f32>(0.0);
+    sum.low = select(ramp_columns(air.low, air.ground_radius, h, mu, far), sum.low, air.low.fall < none);
+#ifdef AIR_EIGHT_LANES
+    sum.high = select(ramp_columns(air.high, air.ground_radius, h, mu, far), sum.high, air.high.fall < none);
+#endif
     return sum;
+}
+
+/// Columns of all lanes [m] from altitude `h` along zenith cosine `mu` to the top of the air, outwards from the lowest point; below the horizon those
+/// along the horizon.
+///
+/// domain  h in [0, air.top] m lin
+/// domain  mu in [-1, 1] 1 lin
+/// range   [0, 1e7] m
+/// error   3e-4 rel of reference::air_tables::columns_to_top
+/// outside undefined
+/// source  veduta::math::squared for exponential layers; between the bends of others Abramowitz1964 table 25.4
+fn columns_to_top(air: Air, h: f32, mu: f32) -> Lanes {
+    let seen = max(mu, horizon_cosine(air.ground_radius, h));
+    if seen >= 0.0 {
+        return outward_columns(air, h, seen, top_distance(air.ground_radius, air.top, h, seen));
+    }
+    let below = (air.ground_radius + h) * seen * seen / (1.0 + sqrt((1.0 - seen) * (1.0 + seen)));
+    let lowest = max(h - below, 0.0);
+    let before = outward_columns(air, lowest, 0.0, -(air.ground_radius + h) * seen);
+    let beyond = outward_columns(air, lowest, 0.0, top_distance(air.ground_radius, air.top, lowest, 0.0));
+    return Lanes(before.low + beyond.low, before.high + beyond.high);
 }
 
 /// Place of coordinates in [0, 1] in a texture of `size` texels whose outermost texels' centres are 0 and 1.
@@ -104,6 +161,7 @@ fn columns_to_top(air: Air, h: f32, mu: f32) -> Lanes {
 /// domain  size in [2, 1024] 1 log
 /// range   [0, 1] 1
 /// error   2e-7 abs of reference::air_tables::texture_place
+/// outside undefined
 /// source  elementary
 fn texture_place(coordinates: vec2<f32>, size: vec2<f32>) -> vec2<f32> {
     return (coordinates * (size - 1.0) + 0.5) / size;
@@ -115,6 +173,7 @@ fn texture_place(coordinates: vec2<f32>, size: vec2<f32>) -> vec2<f32> {
 /// domain  size in [2, 1024] 1 log
 /// range   [0, 1024] 1
 /// error   2e-7 rel of reference::air_tables::texel_coordinates
+/// outside undefined
 /// source  elementary
 fn texel_coordinates(texel: vec2<f32>, size: vec2<f32>) -> vec2<f32> {
     return texel / (size - 1.0);
@@ -145,9 +204,9 @@ fn sun_depth(columns: texture_2d_array<f32>, linear: sampler, air: Air, h: f32, 
 /// domain  ground_radius in [3e6, 1e8] m log
 /// domain  h in [0, 1e5] m lin
 /// domain  mu in [-1, 1] 1 lin
-/// domain  angular_radius in [1e-3, 0.1] rad log
+/// domain  angular_radius in [0, 0.1] rad lin
 /// range   [0, 1] 1
-/// error   0.02 abs of reference::air_tables::sun_above_horizon
+/// error   0.05 abs of reference::air_tables::sun_above_horizon
 /// source  area of a segment of the disc, by a cubic
 fn sun_above_horizon(ground_radius: f32, h: f32, mu: f32, angular_radius: f32) -> f32 {
     let horizon = horizon_cosine(ground_radius, h);

@@ -49,12 +49,13 @@ fn diffuse_coordinates(top: f32, h: f32, sun_mu: f32) -> vec2<f32> {
     return vec2<f32>(clamp(x, 0.0, 1.0), sqrt(clamp(h / top, 0.0, 1.0)));
 }
 
-/// Altitude [m] and zenith cosine of the sun of coordinates: the inverse of `diffuse_coordinates`.
+/// Altitude [m] and zenith cosine of the sun of coordinates: the inverse of `diffuse_coordinates`. The error is that of the altitude.
 ///
 /// domain  top in [5e4, 2e5] m lin
 /// domain  place in [0, 1] 1 lin
 /// range   [-1, 2e5] 1
-/// error   1e-6 abs of reference::air_tables::diffuse_place
+/// error   0.02 abs of reference::air_tables::diffuse_place
+/// outside undefined
 /// source  as diffuse_coordinates
 fn diffuse_place(top: f32, place: vec2<f32>) -> vec2<f32> {
     let low = bend_sun(LOWEST_SUN);
@@ -70,6 +71,7 @@ fn diffuse_place(top: f32, place: vec2<f32>) -> vec2<f32> {
 /// domain  moments.aside in [-1, 1] 1 lin
 /// range   [-200, 10] 1
 /// error   1e-5 abs of reference::air_tables::encode_moments
+/// outside undefined
 /// source  logarithm of the mean, so that night and day have the same relative precision: ours
 fn encode_moments(moments: Moments) -> vec4<f32> {
     let mean = max(dot(moments.whole, vec3<f32>(1.0 / 3.0)), 1e-30);
@@ -78,11 +80,12 @@ fn encode_moments(moments: Moments) -> vec4<f32> {
 
 /// Moments of three texel layers.
 ///
-/// domain  first in [-1, 1] 1 lin
+/// domain  first in [-3, 3] 1 lin
 /// domain  second in [-1, 1] 1 lin
 /// domain  third in [-1, 1] 1 lin
 /// range   [-10, 100] 1
-/// error   2e-6 abs of reference::air_tables::decode_moments
+/// error   2e-5 abs of reference::air_tables::decode_moments
+/// outside undefined
 /// source  as encode_moments
 fn decode_moments(first: vec4<f32>, second: vec4<f32>, third: vec4<f32>) -> Moments {
     let chroma = max(vec3<f32>(first.y, first.z, 3.0 - first.y - first.z), vec3<f32>(0.0));
@@ -110,7 +113,8 @@ fn diffuse_moments(moments: texture_2d_array<f32>, linear: sampler, top: f32, h:
 /// Light scattered, where the lanes' densities are `densities`, out of a field of light given by its moments, into the direction of
 /// zenith cosine `mu` with the cosine `nu` to the sun.
 ///
-/// domain  densities in [0, 1] 1 lin
+/// domain  densities.low in [0, 1] 1 lin
+/// domain  densities.high in [0, 1] 1 lin
 /// domain  moments.whole in [0, 10] 1 lin
 /// domain  moments.up in [-1, 1] 1 lin
 /// domain  moments.level in [-1, 1] 1 lin
@@ -118,8 +122,8 @@ fn diffuse_moments(moments: texture_2d_array<f32>, linear: sampler, top: f32, h:
 /// domain  mu in [-1, 1] 1 lin
 /// domain  sun_mu in [-1, 1] 1 lin
 /// domain  nu in [-1, 1] 1 lin
-/// range   [0, 10] 1/m
-/// error   1e-5 rel of reference::air_tables::diffuse_source
+/// range   [0, 1] 1/m
+/// error   4e-9 abs of reference::air_tables::diffuse_source
 /// outside undefined
 /// source  addition theorem of Legendre's polynomials
 fn diffuse_source(air: Air, densities: Lanes, moments: Moments, mu: f32, sun_mu: f32, nu: f32) -> vec3<f32> {
@@ -139,8 +143,9 @@ fn diffuse_source(air: Air, densities: Lanes, moments: Moments, mu: f32, sun_mu:
 /// domain  moments.up in [-1, 1] 1 lin
 /// domain  moments.level in [-1, 1] 1 lin
 /// domain  moments.aside in [-1, 1] 1 lin
-/// range   [0, 10] 1
-/// error   1e-6 abs of reference::air_tables::level_irradiance
+/// range   [0, 11] 1
+/// error   3e-6 abs of reference::air_tables::level_irradiance
+/// outside undefined
 /// source  Ramamoorthi2001
 fn level_irradiance(moments: Moments) -> vec3<f32> {
     return moments.whole * max(0.25 + 0.5 * moments.up + 0.3125 * moments.level, vec3<f32>(0.0));
@@ -171,9 +176,15 @@ fn plane_irradiance(moments: Moments, normal: vec3<f32>, to_sun: vec3<f32>) -> v
 /// Sum of two fields of light.
 ///
 /// domain  a.whole in [0, 10] 1 lin
+/// domain  a.up in [-1, 1] 1 lin
+/// domain  a.level in [-1, 1] 1 lin
+/// domain  a.aside in [-1, 1] 1 lin
 /// domain  b.whole in [0, 10] 1 lin
+/// domain  b.up in [-1, 1] 1 lin
+/// domain  b.level in [-1, 1] 1 lin
+/// domain  b.aside in [-1, 1] 1 lin
 /// range   [-10, 20] 1
-/// error   1e-6 abs of reference::air_tables::add_moments
+/// error   2e-6 abs of reference::air_tables::add_moments
 /// outside undefined
 /// source  elementary
 fn add_moments(a: Moments, b: Moments) -> Moments {

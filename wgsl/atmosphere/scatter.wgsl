@@ -40,8 +40,9 @@ struct SplitPhases {
 /// Splits the phase functions for a cosine `nu` of the scattering angle.
 ///
 /// domain  nu in [-1, 1] 1 lin
-/// range   [0, 100] 1
-/// error   2e-4 rel of reference::air_tables::split_phases
+/// range   [0, 1e4] 1
+/// error   1e-5 rel of reference::air_tables::split_phases
+/// outside undefined
 /// source  ours
 fn split_phases(air: Air, nu: f32) -> SplitPhases {
     let phases = air_phases(air, nu);
@@ -61,7 +62,7 @@ fn split_phases(air: Air, nu: f32) -> SplitPhases {
 /// domain  nu in [-1, 1] 1 lin
 /// domain  angular_radius in [0, 0.1] rad lin
 /// range   [0, 10] 1/m
-/// error   0.02 rel of reference::air_tables::air_source
+/// error   0.02 rel of reference::sky::Sky::single_scatter
 /// source  ours
 fn air_source(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, linear: sampler, air: Air, phases: SplitPhases, h: f32, mu: f32, sun_mu: f32, nu: f32, angular_radius: f32, all_orders: bool) -> AirSource {
     let densities = air_densities(air, h);
@@ -84,7 +85,7 @@ fn air_source(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, li
 /// domain  depth in [0, 100] 1 lin
 /// domain  left in [0, 1] 1 lin
 /// range   [-1, 10] 1
-/// error   1e-5 rel of reference::air_tables::step_share
+/// error   2e-6 rel of reference::air_tables::step_share
 /// outside undefined
 /// source  Hillaire2015; series at small optical depth
 fn step_share(depth: vec3<f32>, left: vec3<f32>) -> vec3<f32> {
@@ -98,7 +99,7 @@ fn step_share(depth: vec3<f32>, left: vec3<f32>) -> vec3<f32> {
 /// domain  steps in [1, 64] 1 lin
 /// domain  angular_radius in [0, 0.1] rad lin
 /// range   [0, 1e4] 1
-/// error   0.03 rel of reference::air_tables::scatter_along
+/// error   0.03 rel of reference::sky::Sky::single_scatter
 /// source  Nishita1993; veduta::math::squared
 fn scatter_along(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, linear: sampler, air: Air, ray: AirRay, angular_radius: f32, all_orders: bool, steps: i32) -> Scattered {
     let phases = split_phases(air, ray.nu);
@@ -152,7 +153,8 @@ fn scatter_along(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
 /// domain  scattered.transmittance in [0, 1] 1 lin
 /// domain  nu in [-1, 1] 1 lin
 /// range   [0, 1e8] 1/sr
-/// error   2e-4 rel of reference::air_tables::scattered_radiance
+/// error   1e-5 rel of reference::air_tables::scattered_radiance
+/// outside undefined
 /// source  elementary
 fn scattered_radiance(air: Air, scattered: Scattered, nu: f32) -> vec3<f32> {
     return scattered.smooth_light + scattered.peaked_light * peak_phase(air, nu);

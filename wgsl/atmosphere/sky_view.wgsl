@@ -52,7 +52,7 @@ fn azimuth_place(eye: SkyEye, aside: vec2<f32>) -> f32 {
 /// Place of a unit vector `dir` in the tables of an eye within the air.
 ///
 /// domain  eye.to_sun in [-1, 1] 1 lin
-/// domain  eye.altitude in [0, 1e5] m lin
+/// domain  eye.altitude in [0, 1e8] m lin
 /// domain  dir in [-1, 1] 1 lin
 /// range   [-1, 1] 1
 /// error   1e-3 abs of reference::air_tables::sky_place_inside
@@ -62,7 +62,7 @@ fn sky_place_inside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
     // Tangent of half the zenith angle over that of the horizon, or the same from the nadir.
     let aside = dot(dir.xz, dir.xz);
     let over = inverseSqrt(max(aside, 1e-20));
-    let ratio = aside * over / max((1.0 + dir.y) * eye.horizon, 1e-20);
+    let ratio = max(aside, 1e-20) * over / max((1.0 + dir.y) * eye.horizon, 1e-20);
     let flat = inverseSqrt(max(dot(eye.to_sun.xz, eye.to_sun.xz), 1e-20));
     let azimuth = clamp(dot(dir.xz, eye.to_sun.xz) * (over * flat), -1.0, 1.0);
     let y = sqrt(max(1.0 - min(ratio, 1.0 / ratio), 0.0));
@@ -105,7 +105,7 @@ fn sky_place(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
 /// Direction of coordinates in the tables of an eye: the inverse of `sky_place`. The sun's azimuth is that of -z when it stands in the zenith.
 ///
 /// domain  eye.to_sun in [-1, 1] 1 lin
-/// domain  eye.altitude in [0, 1e5] m lin
+/// domain  eye.altitude in [0, 1e8] m lin
 /// domain  place in [0, 1] 1 lin
 /// range   [-1, 1] 1
 /// error   1e-3 abs of reference::air_tables::sky_direction
@@ -153,6 +153,7 @@ fn sky_rows(eye: SkyEye, rows: f32) -> f32 {
 /// domain  rows in [6, 1024] 1 log
 /// range   [0, 1] 1
 /// error   2e-7 abs of reference::air_tables::sky_row
+/// outside undefined
 /// source  elementary
 fn sky_row(eye: SkyEye, y: f32, below: bool, rows: f32) -> f32 {
     let above = sky_rows(eye, rows);
@@ -168,7 +169,7 @@ fn sky_row(eye: SkyEye, y: f32, below: bool, rows: f32) -> f32 {
 /// domain  place.nu in [-1, 1] 1 lin
 /// domain  eye.scale in [1, 1e6] 1 log
 /// range   [0, 1e6] 1/sr
-/// error   0.02 rel of reference::air_tables::sky_radiance
+/// error   0.02 rel of reference::sky::Sky::single_scatter
 /// source  Hillaire2020
 fn sky_radiance(sky: texture_2d_array<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace) -> vec3<f32> {
     let size = vec2<f32>(textureDimensions(sky));

@@ -7,9 +7,10 @@
 /// the error falls with the fourth power of the count.
 ///
 /// domain  count in [1, 512] 1 log
-/// domain  i in [0, 0] 1 lin
+/// domain  i in [0, count) 1 lin
 /// range   [0, 1] 1
 /// error   6e-7 abs of reference::quadrature::squared_node
+/// outside undefined
 /// source  Sag1964; sum of the weights in closed form: ours
 fn squared_node(count: i32, i: i32) -> vec2<f32> {
     let n = f32(max(count, 1));

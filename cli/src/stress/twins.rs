@@ -1,6 +1,7 @@
 //! Every public function's f64 twin, called with the bits of a row, and what is particular about its arguments.
 
 use veduta::reference::air_ray::{self, AirRay};
+use veduta::reference::air_tables::{self, Moments, Scattered, SkyEye, SkyPlace, SplitPhases};
 use veduta::reference::atmosphere::{Atmosphere, SkyLight};
 use veduta::reference::clouds::{CloudLayer, CloudLight};
 use veduta::reference::fractal::warp;
@@ -10,14 +11,15 @@ use veduta::reference::planet::{ShellSegment, Span};
 use veduta::reference::terrain::{Rock, Terrain, TerrainHit, ThreeLights};
 use veduta::reference::textbook::{self, AirLight};
 use veduta::reference::{
-    atmosphere, clouds, fractal, hash, math, medium, noise, phase, planet, post, terrain, tone_map,
+    atmosphere, clouds, fractal, hash, math, medium, noise, phase, planet, post, quadrature,
+    terrain, tone_map,
 };
 use veduta_compose::header::{Bound, Interval, Spacing};
 
 use super::airs;
 
 /// The most numbers that a result has.
-pub const MOST: usize = 10;
+pub const MOST: usize = 16;
 
 /// The numbers of a twin's result, in the order of the function's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +48,36 @@ impl Values {
 }
 
 /// Functions that read textures, each with the test of `tests/all` that judges it on the device.
-pub const ELSEWHERE: &[(&str, &str)] = &[];
+pub const ELSEWHERE: &[(&str, &str)] = &[
+    (
+        "veduta::atmosphere::columns::sun_depth",
+        "row_a07_the_table_of_columns_is_right_at_every_height_and_angle",
+    ),
+    (
+        "veduta::atmosphere::diffuse::diffuse_moments",
+        "moments_of_diffuse_light_meet_paths",
+    ),
+    (
+        "veduta::atmosphere::orders::order_moments",
+        "moments_of_diffuse_light_meet_paths",
+    ),
+    (
+        "veduta::atmosphere::scatter::air_source",
+        "single_scattering_from_tables_meets_quadrature",
+    ),
+    (
+        "veduta::atmosphere::scatter::scatter_along",
+        "single_scattering_from_tables_meets_quadrature",
+    ),
+    (
+        "veduta::atmosphere::sky_view::sky_radiance",
+        "single_scattering_from_tables_meets_quadrature",
+    ),
+    (
+        "veduta::atmosphere::aerial::aerial_light",
+        "air_before_things_meets_quadrature",
+    ),
+];
 
 /// What is read from the columns of a row.
 pub trait Argument: Sized {
@@ -189,6 +220,27 @@ argument!(AirRay {
     meets_ground: u32
 });
 
+argument!(Moments {
+    whole: [f64; 3],
+    up: [f64; 3],
+    level: [f64; 3],
+    aside: [f64; 3]
+});
+argument!(Scattered {
+    smooth_light: [f64; 3],
+    peaked_light: [f64; 3],
+    transmittance: [f64; 3]
+});
+argument!(SkyEye {
+    to_sun: [f64; 3],
+    altitude: f64,
+    horizon: f64,
+    ground_radius: f64,
+    top: f64,
+    scale: f64,
+    sun_angular_radius: f64
+});
+
 impl Argument for CloudLight {
     const COLUMNS: usize = 5;
     fn read(bits: &[u32]) -> CloudLight {
@@ -239,6 +291,31 @@ pub trait Answer {
 impl Answer for f64 {
     fn values(self) -> Values {
         Values::new(&[self])
+    }
+}
+
+impl Answer for i32 {
+    fn values(self) -> Values {
+        Values::new(&[f64::from(self)])
+    }
+}
+
+impl Answer for Moments {
+    fn values(self) -> Values {
+        Values::new(&[self.whole, self.up, self.level, self.aside].concat())
+    }
+}
+
+impl Answer for SplitPhases {
+    fn values(self) -> Values {
+        Values::new(&[self.smooth_lanes, self.peaked_lanes].concat())
+    }
+}
+
+impl Answer for SkyPlace {
+    fn values(self) -> Values {
+        let below = f64::from(u8::from(self.below));
+        Values::new(&[self.x, self.y, below, self.nu])
     }
 }
 
@@ -615,6 +692,19 @@ impl Entry {
             .lin("ray.dark_from", 0.0, 1.2e6)
             .lin("ray.dark_to", 0.0, 1.2e6)
             .lin("ray.meets_ground", 0.0, 1.0)
+    }
+
+    /// An eye anywhere, and the sun.
+    fn eye(self) -> Entry {
+        self.log("eye.altitude", 1.0, 1e8)
+            .branch("eye.altitude", &[1e4, 1e5, 3.6e7])
+            .log("eye.horizon", 1.0, 40.0)
+            .log("eye.ground_radius", 3e6, 1e7)
+            .lin("eye.top", 5e4, 2e5)
+            .log("eye.scale", 1.0, 1e6)
+            .lin("eye.sun_angular_radius", 0.0, 0.1)
+            .lin("eye.to_sun", -1.0, 1.0)
+            .unit("eye.to_sun")
     }
 
     fn layer(self) -> Entry {
@@ -1103,6 +1193,114 @@ pub fn registry() -> Vec<Entry> {
         "medium::peak_phase",
         |air: Air, nu: f64| medium::peak_phase(air.0, nu)
     );
+    same!(
+        list,
+        "math::gauss",
+        "quadrature",
+        quadrature,
+        gauss_four,
+        gauss_five
+    );
+    same!(
+        list,
+        "math::squared",
+        "quadrature",
+        quadrature,
+        squared_node
+    );
+    same!(
+        list,
+        "atmosphere::columns",
+        "air_tables",
+        air_tables,
+        horizon_cosine,
+        column_coordinates,
+        column_place,
+        texture_place,
+        texel_coordinates,
+        sun_above_horizon
+    );
+    other!(
+        list,
+        "atmosphere::columns::column_scale",
+        "air_tables::column_scale",
+        |air: Air, h: f64, mu: f64| air_tables::column_scale(air.0, h, mu)
+    );
+    other!(
+        list,
+        "atmosphere::columns::columns_to_top",
+        "air_tables::columns_to_top",
+        |air: Air, h: f64, mu: f64| air_tables::columns_to_top(air.0, h, mu)
+    );
+    same!(
+        list,
+        "atmosphere::diffuse",
+        "air_tables",
+        air_tables,
+        diffuse_coordinates,
+        diffuse_place,
+        encode_moments,
+        decode_moments,
+        level_irradiance,
+        plane_irradiance,
+        add_moments
+    );
+    other!(
+        list,
+        "atmosphere::diffuse::diffuse_source",
+        "air_tables::diffuse_source",
+        |air: Air, densities: [f64; 8], moments: Moments, mu: f64, sun_mu: f64, nu: f64| {
+            air_tables::diffuse_source(air.0, densities, moments, mu, sun_mu, nu)
+        }
+    );
+    same!(
+        list,
+        "atmosphere::orders",
+        "air_tables",
+        air_tables,
+        further_orders
+    );
+    other!(
+        list,
+        "atmosphere::scatter::split_phases",
+        "air_tables::split_phases",
+        |air: Air, nu: f64| air_tables::split_phases(air.0, nu)
+    );
+    same!(
+        list,
+        "atmosphere::scatter",
+        "air_tables",
+        air_tables,
+        step_share
+    );
+    other!(
+        list,
+        "atmosphere::scatter::scattered_radiance",
+        "air_tables::scattered_radiance",
+        |air: Air, scattered: Scattered, nu: f64| air_tables::scattered_radiance(
+            air.0, scattered, nu
+        )
+    );
+    same!(
+        list,
+        "atmosphere::sky_view",
+        "air_tables",
+        air_tables,
+        sky_place,
+        sky_direction,
+        sky_rows,
+        sky_row
+    );
+    same!(
+        list,
+        "atmosphere::aerial",
+        "air_tables",
+        air_tables,
+        aerial_row,
+        aerial_spacing,
+        aerial_distance,
+        aerial_slice
+    );
     same!(list, "clouds::field", "clouds", clouds, shape_coverage);
     other!(
         list,
@@ -1448,6 +1646,44 @@ fn particular(entry: Entry) -> Entry {
         ("atmosphere::medium", _) => entry
             .branch("nu", &[0.999, 0.9999])
             .branch("h", &[1e3, 2e3, 3e3, 4e3, 5e3, 1e4, 1.2e4, 2.5e4, 3e4, 4e4]),
+        ("atmosphere::columns", "column_coordinates") => {
+            let level = |radius| air_tables::horizon_cosine(radius, 5e4);
+            entry
+                .lin("h", 0.0, 5e4)
+                .branch("mu", &[level(3e6), level(1e8)])
+        }
+        ("atmosphere::columns", "column_scale") => entry.lin("h", 0.0, 5e4),
+        ("atmosphere::columns", "columns_to_top") => entry
+            .lin("h", 0.0, 5e4)
+            .branch("h", &[100.0, 1e3, 1e4])
+            .branch("mu", &[-0.1, -0.01, -1e-3, 1e-3, 0.01])
+            .jumps("level rays from the top", 1e-6)
+            .weight(30.0),
+        ("atmosphere::columns", "sun_above_horizon") => entry
+            .branch("mu", &[-0.1, -0.01, -1e-3])
+            .jumps("a small sun at the horizon", 1e-6),
+        ("atmosphere::diffuse", "diffuse_source") => entry.weight(3.0),
+        ("atmosphere::diffuse", "plane_irradiance") => entry.unit("normal").unit("to_sun"),
+        ("atmosphere::scatter", "split_phases") => entry.branch("nu", &[0.999, 0.9999]),
+        ("atmosphere::scatter", "step_share") => entry.branch("depth", &[f64::from(0.1_f32), 0.01]),
+        ("atmosphere::sky_view", "sky_place") => entry
+            .eye()
+            .unit("dir")
+            .jumps("directions along the horizon", 1e-6),
+        ("atmosphere::sky_view", "sky_direction") => entry.eye().jumps("a sun in the zenith", 1e-6),
+        ("atmosphere::sky_view", _) => {
+            let mut entry = entry.eye();
+            entry.prepare.push(Prepare::Whole("rows"));
+            entry
+        }
+        ("atmosphere::aerial", "aerial_row") => {
+            let mut entry = entry;
+            entry.prepare.push(Prepare::Whole("rows"));
+            entry
+        }
+        ("atmosphere::aerial", "aerial_spacing") => {
+            entry.eye().jumps("the altitude of the change", 1e-6)
+        }
         ("atmosphere::sun_disc", _) => entry.unit("dir").unit("to_sun"),
         ("clouds::field", "cloud_density") => entry
             .layer()

@@ -1,0 +1,433 @@
+//! Mappings, payloads and sums of the tables of air and sky, from what they stand for. Lengths in metres, angles in radians.
+
+use super::air_ray;
+use super::math::{dot, mix, one_minus_exp_over_x, scale};
+use super::medium::{air_phases, air_scattering, peak_phase};
+use super::planet::top_distance;
+use super::sky::Sky;
+use crate::atmosphere::{Atmosphere, Lane, MOST_LANES, Profile};
+use std::f64::consts::PI;
+
+/// Zenith cosine of the horizon.
+pub fn horizon_cosine(ground_radius: f64, h: f64) -> f64 {
+    let h = h.max(0.0);
+    -(h * (2.0 * ground_radius + h)).sqrt() / (ground_radius + h)
+}
+
+/// Coordinates in the table of columns.
+pub fn column_coordinates(ground_radius: f64, top: f64, h: f64, mu: f64) -> [f64; 2] {
+    let horizon = horizon_cosine(ground_radius, h);
+    let above = (mu - horizon) / (1.0 - horizon);
+    [
+        above.clamp(0.0, 1.0).sqrt(),
+        (h / top).clamp(0.0, 1.0).sqrt(),
+    ]
+}
+
+/// Altitude and zenith cosine of coordinates in the table of columns.
+pub fn column_place(ground_radius: f64, top: f64, place: [f64; 2]) -> [f64; 2] {
+    let h = top * place[1] * place[1];
+    let horizon = horizon_cosine(ground_radius, h);
+    [h, horizon + (1.0 - horizon) * place[0] * place[0]]
+}
+
+/// Densities of exponential lanes at the lowest point of a path that does not go below the ground; 1 for the others.
+pub fn column_scale(air: &Atmosphere, h: f64, mu: f64) -> [f64; MOST_LANES] {
+    let lowest = if mu < 0.0 {
+        let sine = ((1.0 - mu) * (1.0 + mu)).max(0.0).sqrt();
+        ((air.planet_radius + h) * sine - air.planet_radius).max(0.0)
+    } else {
+        h
+    };
+    let mut scales = [1.0; MOST_LANES];
+    for (scale, Lane { profile, .. }) in scales.iter_mut().zip(air.lanes()) {
+        if let Profile::Exponential { scale_height } = profile {
+            *scale = (-lowest / scale_height).exp();
+        }
+    }
+    scales
+}
+
+/// Columns of all lanes to the top of the air; of a direction below the horizon those along the horizon. Nothing for an
+/// atmosphere that is not valid.
+pub fn columns_to_top(air: &Atmosphere, h: f64, mu: f64) -> [f64; MOST_LANES] {
+    let mut columns = [0.0; MOST_LANES];
+    let Ok(sky) = Sky::new(air) else {
+        return columns;
+    };
+    let mu = mu.max(horizon_cosine(air.planet_radius, h));
+    let end = top_distance(air.planet_radius, air.thickness, h, mu);
+    let found = sky.columns(h, mu, end);
+    for (column, lane) in columns.iter_mut().zip(air.lanes()) {
+        let at = sky.profiles.iter().position(|p| *p == lane.profile);
+        *column = at.map_or(0.0, |k| found[k]);
+    }
+    columns
+}
+
+/// Optical depth to the sun; that along the horizon of a sun below it. Nothing for an atmosphere that is not valid.
+pub fn sun_depth(air: &Atmosphere, h: f64, mu: f64) -> [f64; 3] {
+    super::medium::air_extinction(air, columns_to_top(air, h, mu))
+}
+
+/// Place of coordinates in a texture whose outermost texels' centres are 0 and 1.
+pub fn texture_place(coordinates: [f64; 2], size: [f64; 2]) -> [f64; 2] {
+    std::array::from_fn(|k| (coordinates[k] * (size[k] - 1.0) + 0.5) / size[k])
+}
+
+/// Coordinates of the centre of a texel.
+pub fn texel_coordinates(texel: [f64; 2], size: [f64; 2]) -> [f64; 2] {
+    std::array::from_fn(|k| texel[k] / (size[k] - 1.0))
+}
+
+/// Share of the sun's disc above the horizon: the area of a segment.
+pub fn sun_above_horizon(ground_radius: f64, h: f64, mu: f64, angular_radius: f64) -> f64 {
+    let above = horizon_cosine(ground_radius, h).acos() - mu.clamp(-1.0, 1.0).acos();
+    if above.abs() >= angular_radius {
+        return f64::from(u8::from(above > 0.0));
+    }
+    let depth = -above / angular_radius;
+    (depth.acos() - depth * (1.0 - depth * depth).max(0.0).sqrt()) / PI
+}
+
+/// Moments of radiance over the sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moments {
+    /// Integral of the radiance.
+    pub whole: [f64; 3],
+    /// Weighted with mu, over the integral.
+    pub up: [f64; 3],
+    /// Weighted with (3 mu^2 - 1) / 2, over the integral.
+    pub level: [f64; 3],
+    /// Weighted with s cos(phi) / sun_s, mu s cos(phi) / sun_s and s^2 cos(2 phi) / sun_s^2, over the integral; of the
+    /// channels' mean.
+    pub aside: [f64; 3],
+}
+
+const SUN_BEND: f64 = 0.06;
+const LOWEST_SUN: f64 = -0.4;
+
+fn bend_sun(mu: f64) -> f64 {
+    (mu.abs() / SUN_BEND).ln_1p().copysign(mu)
+}
+
+/// Coordinates in the table of diffuse light.
+pub fn diffuse_coordinates(top: f64, h: f64, sun_mu: f64) -> [f64; 2] {
+    let low = bend_sun(LOWEST_SUN);
+    let x = (bend_sun(sun_mu) - low) / (bend_sun(1.0) - low);
+    [x.clamp(0.0, 1.0), (h / top).clamp(0.0, 1.0).sqrt()]
+}
+
+/// Altitude and zenith cosine of the sun of coordinates in the table of diffuse light.
+pub fn diffuse_place(top: f64, place: [f64; 2]) -> [f64; 2] {
+    let low = bend_sun(LOWEST_SUN);
+    let bent = low + (bend_sun(1.0) - low) * place[0];
+    let mu = (SUN_BEND * bent.abs().exp_m1()).copysign(bent);
+    [top * place[1] * place[1], mu.clamp(-1.0, 1.0)]
+}
+
+/// The first texel layer of moments.
+pub fn encode_moments(moments: Moments) -> [f64; 4] {
+    let [r, g, b] = moments.whole;
+    let mean = ((r + g + b) / 3.0).max(1e-30);
+    [mean.log2(), r / mean, g / mean, moments.aside[0]]
+}
+
+/// Moments of three texel layers.
+pub fn decode_moments(first: [f64; 4], second: [f64; 4], third: [f64; 4]) -> Moments {
+    let chroma = [first[1], first[2], 3.0 - first[1] - first[2]];
+    Moments {
+        whole: chroma.map(|c| c.max(0.0) * first[0].exp2()),
+        up: [second[0], second[1], second[2]],
+        level: [third[0], third[1], third[2]],
+        aside: [first[3], second[3], third[3]],
+    }
+}
+
+/// The field's radiance over its mean, up to degree two and but for the factors of degree, in a direction of zenith cosine
+/// `mu`; `x` is what the direction shares with the sun across the vertical.
+fn degrees(moments: &Moments, mu: f64, x: f64, sun_mu: f64, c: usize) -> [f64; 2] {
+    let squares = (1.0 - mu * mu) * (1.0 - sun_mu * sun_mu);
+    let [first, second, third] = moments.aside;
+    [
+        mu * moments.up[c] + x * first,
+        0.5 * (3.0 * mu * mu - 1.0) * moments.level[c]
+            + 3.0 * mu * x * second
+            + 0.75 * (2.0 * x * x - squares) * third,
+    ]
+}
+
+/// Light scattered out of a field of light.
+pub fn diffuse_source(
+    air: &Atmosphere,
+    densities: [f64; MOST_LANES],
+    moments: Moments,
+    mu: f64,
+    sun_mu: f64,
+    nu: f64,
+) -> [f64; 3] {
+    let weights = |of: fn(&crate::atmosphere::Lobe) -> f64| {
+        let mut weights = [1.0; MOST_LANES];
+        for (weight, lane) in weights.iter_mut().zip(air.lanes()) {
+            *weight = lane.lobe.map_or(0.0, |lobe| of(&lobe));
+        }
+        air_scattering(air, densities, weights)
+    };
+    let parts = [
+        weights(|_| 1.0),
+        weights(|l| l.first),
+        weights(|l| l.second),
+    ];
+    std::array::from_fn(|c| {
+        let [first, second] = degrees(&moments, mu, nu - mu * sun_mu, sun_mu, c);
+        let sum = parts[0][c] + 3.0 * parts[1][c] * first + 5.0 * parts[2][c] * second;
+        sum.max(0.0) * moments.whole[c] / (4.0 * PI)
+    })
+}
+
+/// Irradiance on a level plane.
+pub fn level_irradiance(moments: Moments) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        let shape = 0.25 + 0.5 * moments.up[c] + 5.0 / 16.0 * moments.level[c];
+        moments.whole[c] * shape.max(0.0)
+    })
+}
+
+/// Irradiance on a plane.
+pub fn plane_irradiance(moments: Moments, normal: [f64; 3], to_sun: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        let x = dot(normal, to_sun) - normal[1] * to_sun[1];
+        let [first, second] = degrees(&moments, normal[1], x, to_sun[1], c);
+        moments.whole[c] * (0.25 + 0.5 * first + 5.0 / 16.0 * second).max(0.0)
+    })
+}
+
+/// Sum of two fields of light.
+pub fn add_moments(a: Moments, b: Moments) -> Moments {
+    let sum = |v: [f64; 3]| v[0] + v[1] + v[2];
+    let weighted = |x: [f64; 3], y: [f64; 3]| {
+        std::array::from_fn(|c| {
+            let whole = (a.whole[c] + b.whole[c]).max(1e-30);
+            x[c] + (y[c] - x[c]) * (b.whole[c] / whole)
+        })
+    };
+    let mean = sum(b.whole) / (sum(a.whole) + sum(b.whole)).max(1e-30);
+    Moments {
+        whole: std::array::from_fn(|c| a.whole[c] + b.whole[c]),
+        up: weighted(a.up, b.up),
+        level: weighted(a.level, b.level),
+        aside: mix(a.aside, b.aside, mean),
+    }
+}
+
+/// The light of an order and of all that follow, when they fall as it has fallen against the one before.
+pub fn further_orders(before: Moments, last: Moments) -> Moments {
+    Moments {
+        whole: std::array::from_fn(|c| {
+            let ratio = last.whole[c] / before.whole[c].max(1e-30);
+            last.whole[c] / (1.0 - ratio.clamp(0.0, 0.95))
+        }),
+        ..last
+    }
+}
+
+/// The phase functions of a ray, split into those of smooth and peaked layers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SplitPhases {
+    /// 0 for peaked lanes.
+    pub smooth_lanes: [f64; MOST_LANES],
+    /// Over the peaked phase function, 0 for smooth lanes.
+    pub peaked_lanes: [f64; MOST_LANES],
+}
+
+/// Splits the phase functions.
+pub fn split_phases(air: &Atmosphere, nu: f64) -> SplitPhases {
+    let peak = peak_phase(air, nu).max(1e-9);
+    let mut split = SplitPhases {
+        smooth_lanes: air_phases(air, nu),
+        peaked_lanes: [0.0; MOST_LANES],
+    };
+    for (k, lane) in air.lanes().iter().enumerate() {
+        if lane.peaked() {
+            split.peaked_lanes[k] = split.smooth_lanes[k] / peak;
+            split.smooth_lanes[k] = 0.0;
+        }
+    }
+    split
+}
+
+/// Mean transmittance within steps of an optical depth, of which a share is `left`; that share alone counts for thick steps.
+pub fn step_share(depth: [f64; 3], left: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        if depth[c] < f64::from(0.1_f32) {
+            one_minus_exp_over_x(depth[c])
+        } else {
+            (1.0 - left[c]) / depth[c]
+        }
+    })
+}
+
+/// Light scattered into a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scattered {
+    /// Radiance but for peaked light.
+    pub smooth_light: [f64; 3],
+    /// Radiance of peaked light over the peaked phase function.
+    pub peaked_light: [f64; 3],
+    /// What is left of the light behind.
+    pub transmittance: [f64; 3],
+}
+
+/// Radiance of scattered light.
+pub fn scattered_radiance(air: &Atmosphere, scattered: Scattered, nu: f64) -> [f64; 3] {
+    let peaked = scale(scattered.peaked_light, peak_phase(air, nu));
+    super::math::add(scattered.smooth_light, peaked)
+}
+
+/// What the tables of one eye belong to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkyEye {
+    /// Unit vector to the sun, y up at the eye.
+    pub to_sun: [f64; 3],
+    /// Altitude of the eye.
+    pub altitude: f64,
+    /// Tangent of half the zenith angle of the horizon.
+    pub horizon: f64,
+    /// Radius of the ground sphere.
+    pub ground_radius: f64,
+    /// Thickness of the air.
+    pub top: f64,
+    /// What radiance in the tables is multiplied with.
+    pub scale: f64,
+    /// Angular radius of the sun.
+    pub sun_angular_radius: f64,
+}
+
+/// A direction's place in the tables of an eye.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkyPlace {
+    /// Azimuth from the sun: (1 - cos phi) / 2.
+    pub x: f64,
+    /// Height above, or depth below, the horizon.
+    pub y: f64,
+    /// Whether the direction is below the horizon.
+    pub below: bool,
+    /// Cosine of the angle to the sun.
+    pub nu: f64,
+}
+
+/// Place of a direction in the tables of an eye.
+pub fn sky_place(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
+    let [dx, dy, dz] = dir;
+    let [sx, _, sz] = eye.to_sun;
+    let across = (dx.hypot(dz) * sx.hypot(sz)).max(1e-10);
+    let azimuth = ((dx * sx + dz * sz) / across).clamp(-1.0, 1.0);
+    // The tangent of half the zenith angle, over that of the horizon.
+    let half = 0.5 * dx.hypot(dz).atan2(dy);
+    let ratio = half.tan() / eye.horizon;
+    let lowest = air_ray::tangent_altitude(eye.ground_radius, eye.altitude, dir);
+    let (below, y) = if eye.altitude > eye.top && dy < 0.0 {
+        let below = lowest < 0.0;
+        (
+            below,
+            if below {
+                1.0 - 1.0 / ratio
+            } else {
+                lowest / eye.top
+            },
+        )
+    } else {
+        (ratio > 1.0, 1.0 - ratio.min(1.0 / ratio))
+    };
+    SkyPlace {
+        x: 0.5 * (1.0 - azimuth),
+        y: y.clamp(0.0, 1.0).sqrt(),
+        below,
+        nu: dot(dir, eye.to_sun),
+    }
+}
+
+/// Direction of coordinates in the tables of an eye.
+pub fn sky_direction(eye: SkyEye, place: [f64; 2], below: bool) -> [f64; 3] {
+    let y = place[1].max(f64::from(4e-3_f32));
+    let ratio = 1.0 - y * y;
+    let zenith = if eye.altitude > eye.top && !below {
+        let sine = (eye.ground_radius + eye.top * y * y) / (eye.ground_radius + eye.altitude);
+        PI - sine.min(1.0).asin()
+    } else if below {
+        PI - 2.0 * (ratio / eye.horizon).atan()
+    } else {
+        2.0 * (ratio * eye.horizon).atan()
+    };
+    let cosine = (1.0 - 2.0 * place[0]).clamp(-1.0, 1.0);
+    let around = eye.to_sun[2].hypot(eye.to_sun[0]);
+    let ahead = if around > 1e-10 {
+        eye.to_sun[2].atan2(eye.to_sun[0])
+    } else {
+        -0.5 * PI
+    };
+    let azimuth = ahead + cosine.acos();
+    [
+        zenith.sin() * azimuth.cos(),
+        zenith.cos(),
+        zenith.sin() * azimuth.sin(),
+    ]
+}
+
+/// Rows of the table of the sky above the horizon.
+pub fn sky_rows(eye: SkyEye, rows: f64) -> f64 {
+    if eye.altitude > eye.top {
+        (rows / 3.0).floor()
+    } else {
+        rows
+    }
+}
+
+/// Row of the table of the sky.
+pub fn sky_row(eye: SkyEye, y: f64, below: bool, rows: f64) -> f64 {
+    let above = sky_rows(eye, rows);
+    let (first, count) = if below {
+        (above, rows - above)
+    } else {
+        (0.0, above)
+    };
+    (first + y * (count - 1.0) + 0.5) / rows
+}
+
+/// Row of the tables of the air before things.
+pub fn aerial_row(y: f64, below: bool, rows: f64) -> f64 {
+    let half = 0.5 * rows;
+    let first = if below { half } else { 0.0 };
+    (first + y * (half - 1.0) + 0.5) / rows
+}
+
+/// Where on a ray slices are dense.
+pub fn aerial_spacing(eye: SkyEye, below: bool) -> i32 {
+    match (eye.altitude > 0.15 * eye.top, below) {
+        (false, _) => 0,
+        (true, true) => 1,
+        (true, false) => 2,
+    }
+}
+
+/// Distance of a slice.
+pub fn aerial_distance(spacing: i32, slice: f64, length: f64) -> f64 {
+    let aside = 2.0 * slice - 1.0;
+    length
+        * match spacing {
+            1 => slice * (2.0 - slice),
+            2 => 0.5 + 0.5 * aside * aside.abs(),
+            _ => slice * slice,
+        }
+}
+
+/// Slice of a distance.
+pub fn aerial_slice(spacing: i32, t: f64, length: f64) -> f64 {
+    let share = (t / length).clamp(0.0, 1.0);
+    let aside = 2.0 * share - 1.0;
+    match spacing {
+        1 => 1.0 - (1.0 - share).sqrt(),
+        2 => 0.5 + 0.5 * aside.abs().sqrt().copysign(aside),
+        _ => share.sqrt(),
+    }
+}
