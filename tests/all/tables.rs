@@ -103,7 +103,11 @@ fn light(found: &ProbeLight, truth: &Probed, c: usize) -> (f64, f64, f64) {
 }
 
 fn left(found: &ProbeLight, truth: &Probed, c: usize) -> (f64, f64, f64) {
-    (f64::from(found.transmittance[c]), truth.transmittance[c], 0.0)
+    (
+        f64::from(found.transmittance[c]),
+        truth.transmittance[c],
+        0.0,
+    )
 }
 
 fn centile(all: &[(f64, usize)], share: f64) -> f64 {
@@ -130,7 +134,10 @@ fn told(air: &Atmosphere, ray: &ProbeRay) -> String {
         ray.to_sun[1].asin().to_degrees(),
         ray.distance,
         f64::from(made.sun_mu).asin().to_degrees(),
-        made.length, made.dark_from, made.dark_to, made.nu
+        made.length,
+        made.dark_from,
+        made.dark_to,
+        made.nu
     )
 }
 
@@ -138,7 +145,11 @@ fn told(air: &Atmosphere, ray: &ProbeRay) -> String {
 fn single_scattering_from_tables_meets_quadrature() {
     let eyes = std::env::var("EYES").map_or(40, |v| v.parse().unwrap());
     let show = std::env::var("SHOW").map_or(0, |v| v.parse().unwrap());
-    let presets = if std::env::var("HIGH").is_ok() { vec![Preset::High] } else { vec![Preset::High, Preset::Medium, Preset::Low] };
+    let presets = if std::env::var("HIGH").is_ok() {
+        vec![Preset::High]
+    } else {
+        vec![Preset::High, Preset::Medium, Preset::Low]
+    };
     for (name, seed) in [("earth", 1), ("thesis", 2), ("hazy", 3)] {
         let air = named(name);
         let rays = rays_of_eyes(&air, eyes, 40, seed);
@@ -155,9 +166,19 @@ fn single_scattering_from_tables_meets_quadrature() {
             println!("fast {:.1} s", start.elapsed().as_secs_f64());
             let light = errors(&found, &truth, 1e-6, 0.0, light);
             let left = errors(&found, &truth, 1e-6, 0.0, left);
-            println!("{name} {preset:?}: in-scatter {}, transmittance {}", shown(&light), shown(&left));
+            println!(
+                "{name} {preset:?}: in-scatter {}, transmittance {}",
+                shown(&light),
+                shown(&left)
+            );
             for (off, k) in light.iter().rev().take(show) {
-                println!("   {:.1} % {:?} {:.2e} {:.2e}", 100.0 * off, told(&air, &rays[*k]), found[*k].in_scatter[1], truth[*k].in_scatter[1]);
+                println!(
+                    "   {:.1} % {:?} {:.2e} {:.2e}",
+                    100.0 * off,
+                    told(&air, &rays[*k]),
+                    found[*k].in_scatter[1],
+                    truth[*k].in_scatter[1]
+                );
             }
         }
     }

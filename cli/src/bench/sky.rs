@@ -215,7 +215,12 @@ pub fn run(
     let air = Atmosphere::default();
     let quality = |preset: &str| -> Result<SkyQuality, CliError> {
         let preset = Preset::Named(preset.to_owned().into());
-        Ok(SkyQuality::of(&Settings::resolve(programs, &preset, None, &[])?))
+        Ok(SkyQuality::of(&Settings::resolve(
+            programs,
+            &preset,
+            None,
+            &[],
+        )?))
     };
 
     progress("errors");
