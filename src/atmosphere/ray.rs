@@ -9,7 +9,7 @@ use super::probe::ProbeRay;
 /// 36,000 km its rounding moves the lowest point by up to a metre.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct AirRay {
-    /// Altitude of the start [m].
+    /// Altitude of the start in m.
     pub altitude: f32,
     /// Zenith cosine at the start.
     pub mu: f32,
@@ -19,14 +19,14 @@ pub struct AirRay {
     pub nu: f32,
     /// Zenith cosine of the sun at the start.
     pub sun_mu: f32,
-    /// Distance from the eye to the start [m].
+    /// Distance from the eye to the start in m.
     pub from_eye: f32,
     /// Distance from the start to the end: the top of the air, the ground sphere or the greatest distance; 0 when the ray
-    /// misses the air [m].
+    /// misses the air in m.
     pub length: f32,
-    /// Where the ray enters the planet's shadow [m].
+    /// Where the ray enters the planet's shadow in m.
     pub dark_from: f32,
-    /// Where it leaves the shadow again; the ray is lit throughout when this is not above `dark_from` [m].
+    /// Where it leaves the shadow again; the ray is lit throughout when this is not above `dark_from` in m.
     pub dark_to: f32,
     /// 1 when the ray ends on the ground, else 0.
     pub meets_ground: u32,

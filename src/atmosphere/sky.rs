@@ -401,7 +401,6 @@ impl Sky {
             exposure: view.exposure,
             sun_irradiance: (view.sun.irradiance * colour).to_array(),
             parallel: u32::from(parallel),
-            ..DrawBlock::ZERO
         })
     }
 
