@@ -10,27 +10,5 @@ fn main() {
     let low = std::env::var_os("CARGO_FEATURE_LOW_QUALITY").is_some();
     let default = if low { "thesis_low" } else { "thesis" };
     println!("cargo::metadata=DEFAULT_PRESET={default}");
-    let mut build = veduta_compose::Build::of_veduta("wgsl", "presets")
-        .variant("sky", ["AERIAL"])
-        .variant("sky", ["SUN_DISC"])
-        .variant("sky", ["AERIAL", "AERIAL_TARGETS"]);
-    for program in [
-        "air_columns",
-        "air_diffuse",
-        "sky_view",
-        "sky_aerial",
-        "sky_probe",
-        "probe",
-    ] {
-        build = build.variant(program, ["AIR_EIGHT_LANES"]);
-    }
-    for more in [
-        &["AERIAL"][..],
-        &["SUN_DISC"],
-        &["AERIAL", "AERIAL_TARGETS"],
-        &[],
-    ] {
-        build = build.variant("sky", more.iter().copied().chain(["AIR_EIGHT_LANES"]));
-    }
-    build.write();
+    veduta_compose::Build::of_veduta("wgsl", "presets").write();
 }

@@ -35,6 +35,26 @@ pub struct Build {
     file: String,
 }
 
+/// Variants of veduta's own programs that no scene names, beside those without any feature: those of systems that a host takes alone, each once
+/// more for air of many layers.
+fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
+    let ways: &[&[&str]] = match program {
+        "sky" => &[
+            &[],
+            &["SUN_DISC"],
+            &["AERIAL"],
+            &["AERIAL", "AERIAL_TARGETS"],
+        ],
+        "air_columns" | "air_diffuse" | "sky_view" | "sky_aerial" | "sky_probe" | "sky_query"
+        | "probe" => &[&[]],
+        _ => &[],
+    };
+    let set = |flags: &[&str]| flags.iter().map(|f| (*f).to_owned()).collect();
+    ways.iter()
+        .flat_map(|way| [set(way), set(&[*way, &["AIR_EIGHT_LANES"]].concat())])
+        .collect()
+}
+
 /// What a build comes to.
 #[derive(Clone, Debug)]
 pub struct Output {
@@ -523,11 +543,17 @@ impl Build {
                 }
             }
         }
-        for (_, features) in self
+        let shipped = if self.shipped_programs.unwrap_or(self.programs.is_empty()) {
+            system_variants(&program.name)
+        } else {
+            Vec::new()
+        };
+        let asked = self
             .variants
             .iter()
             .filter(|(name, _)| *name == program.name)
-        {
+            .map(|(_, features)| features);
+        for features in asked.chain(&shipped) {
             let acting: BTreeSet<String> = features.intersection(relevant).cloned().collect();
             let declared = |name| keys.get(name).is_some_and(|key| key.ty == KeyType::Flag);
             if variants.iter().any(|(f, _)| *f == acting) && features.iter().all(|f| declared(f)) {

@@ -587,7 +587,11 @@ fn full() -> Atmosphere {
 /// What the device makes of the block: 32 numbers for each altitude and cosine.
 fn on_device(air: &Atmosphere, places: &[[f32; 2]]) -> Vec<f32> {
     let module = include_str!("../../wgsl/atmosphere/medium.wgsl");
-    let module = module.replace("#define_import_path veduta::atmosphere::medium", "");
+    let module: String = module
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| format!("{line}\n"))
+        .collect();
     let source = format!(
         "{module}
 @group(0) @binding(0) var<uniform> air: Air;
