@@ -15,12 +15,33 @@ fn named(name: &str) -> Atmosphere {
 }
 
 fn quality(preset: Preset) -> SkyQuality {
-    SkyQuality::of(&Settings::resolve(veduta::programs(), &preset, None, &[]).unwrap())
+    let mut q = SkyQuality::of(&Settings::resolve(veduta::programs(), &preset, None, &[]).unwrap());
+    for (k, v) in std::env::vars() {
+        let n: Vec<u32> = v.split(',').filter_map(|p| p.parse().ok()).collect();
+        match k.as_str() {
+            "Q_SKY" => q.sky = [n[0], n[1]], "Q_AERIAL" => q.aerial = [n[0], n[1]], "Q_SLICES" => q.aerial_slices = n[0],
+            "Q_COLUMNS" => q.columns = [n[0], n[1]], "Q_STEPS" => q.sky_steps = n[0], "Q_ASTEPS" => q.aerial_steps = n[0], "Q_DIFFUSE" => q.diffuse = [n[0], n[1]], _ => {}
+        }
+    }
+    q
+}
+
+fn set() -> &'static veduta::ProgramSet {
+    static SET: std::sync::OnceLock<veduta::ProgramSet> = std::sync::OnceLock::new();
+    if std::env::var("LIVE").is_err() { return veduta::programs(); }
+    SET.get_or_init(|| {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+        let source = veduta::compose::Source::read(&[&folder.join("wgsl"), &folder.join("presets")]).unwrap();
+        let mut set = veduta::programs().clone();
+        set.programs.to_mut().retain(|p| !(p.program.starts_with("sky") || p.program.starts_with("air")));
+        for p in ["air_columns", "air_diffuse", "sky_view", "sky_aerial", "sky_probe"] { set.get_or_compose(&source, p, &[]).unwrap(); }
+        set
+    })
 }
 
 fn fast(air: &Atmosphere, quality: &SkyQuality, rays: &[ProbeRay]) -> Vec<ProbeLight> {
     let gpu = gpu();
-    FastProbe::new(&gpu.device, veduta::programs(), air, quality, 0)
+    FastProbe::new(&gpu.device, set(), air, quality, 0)
         .and_then(|mut p| p.run(&gpu.device, &gpu.queue, rays))
         .unwrap()
 }
@@ -103,11 +124,7 @@ fn light(found: &ProbeLight, truth: &Probed, c: usize) -> (f64, f64, f64) {
 }
 
 fn left(found: &ProbeLight, truth: &Probed, c: usize) -> (f64, f64, f64) {
-    (
-        f64::from(found.transmittance[c]),
-        truth.transmittance[c],
-        0.0,
-    )
+    (f64::from(found.transmittance[c]), truth.transmittance[c], 0.0)
 }
 
 fn centile(all: &[(f64, usize)], share: f64) -> f64 {
@@ -134,10 +151,7 @@ fn told(air: &Atmosphere, ray: &ProbeRay) -> String {
         ray.to_sun[1].asin().to_degrees(),
         ray.distance,
         f64::from(made.sun_mu).asin().to_degrees(),
-        made.length,
-        made.dark_from,
-        made.dark_to,
-        made.nu
+        made.length, made.dark_from, made.dark_to, made.nu
     )
 }
 
@@ -145,11 +159,7 @@ fn told(air: &Atmosphere, ray: &ProbeRay) -> String {
 fn single_scattering_from_tables_meets_quadrature() {
     let eyes = std::env::var("EYES").map_or(40, |v| v.parse().unwrap());
     let show = std::env::var("SHOW").map_or(0, |v| v.parse().unwrap());
-    let presets = if std::env::var("HIGH").is_ok() {
-        vec![Preset::High]
-    } else {
-        vec![Preset::High, Preset::Medium, Preset::Low]
-    };
+    let presets = if std::env::var("HIGH").is_ok() { vec![Preset::High] } else { vec![Preset::High, Preset::Medium, Preset::Low] };
     for (name, seed) in [("earth", 1), ("thesis", 2), ("hazy", 3)] {
         let air = named(name);
         let rays = rays_of_eyes(&air, eyes, 40, seed);
@@ -166,19 +176,20 @@ fn single_scattering_from_tables_meets_quadrature() {
             println!("fast {:.1} s", start.elapsed().as_secs_f64());
             let light = errors(&found, &truth, 1e-6, 0.0, light);
             let left = errors(&found, &truth, 1e-6, 0.0, left);
-            println!(
-                "{name} {preset:?}: in-scatter {}, transmittance {}",
-                shown(&light),
-                shown(&left)
-            );
-            for (off, k) in light.iter().rev().take(show) {
-                println!(
-                    "   {:.1} % {:?} {:.2e} {:.2e}",
-                    100.0 * off,
-                    told(&air, &rays[*k]),
-                    found[*k].in_scatter[1],
-                    truth[*k].in_scatter[1]
-                );
+            println!("{name} {preset:?}: in-scatter {}, transmittance {}", shown(&light), shown(&left));
+            for class in ["inside above", "inside below", "outside limb", "outside globe"] {
+                let of = |k: usize| {
+                    let ray = &rays[k];
+                    let below = ray.dir[1].atan2(ray.dir[0].hypot(ray.dir[2])) < touching(&air, ray.altitude, 0.0);
+                    match (ray.altitude > air.thickness, below) { (false, false) => "inside above", (false, true) => "inside below", (true, false) => "outside limb", _ => "outside globe" }
+                };
+                let part: Vec<_> = light.iter().copied().filter(|(_, k)| of(*k) == class).collect();
+                let depth: Vec<_> = left.iter().copied().filter(|(_, k)| of(*k) == class).collect();
+                println!("    {class}: {} ; {}", shown(&part), shown(&depth));
+            }
+            let one = std::env::var("CLASS").unwrap_or_default();
+            for (off, k) in light.iter().rev().filter(|(_, k)| one.is_empty() || (rays[*k].altitude > air.thickness) == (one == "out")).take(show) {
+                println!("   {:.1} % {:?} {:.2e} {:.2e}", 100.0 * off, told(&air, &rays[*k]), found[*k].in_scatter[1], truth[*k].in_scatter[1]);
             }
         }
     }

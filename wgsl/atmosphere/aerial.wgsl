@@ -93,7 +93,7 @@ fn aerial_depth(depths: texture_2d<f32>, linear: sampler, air: Air, eye: SkyEye,
     let slice = aerial_slice(aerial_spacing(eye, place.below), reached, length);
     let size = vec2<f32>(textureDimensions(depths));
     let at = vec2<f32>((slice * (size.x - 1.0) + 0.5) / size.x, aerial_row(place.y, place.below, size.y));
-    return textureSampleLevel(depths, linear, at, 0.0).rgb * (reached / air.top);
+    return exp2(textureSampleLevel(depths, linear, at, 0.0).rgb) * (reached / air.top);
 }
 
 /// Light and transmittance of the air from an eye to the distance `t` from where the ray enters the air, for the direction's place in the tables of the eye and the whole length

@@ -11,6 +11,16 @@
 #import veduta::atmosphere::ray::{tangent_altitude}
 #import veduta::atmosphere::medium::{Air, peak_phase}
 
+/// How dense coordinates of an eye above the air are at the terminator.
+const TERMINATOR_BEND: f32 = 0.1;
+/// Where they are densest.
+const TERMINATOR: f32 = -0.1;
+/// The lowest sun that they hold.
+const DARKEST_SUN: f32 = -0.45;
+
+/// Light below which the codes of an eye above the air are linear.
+const DUSK: f32 = 5.9604645e-8;
+
 /// What the tables of one eye belong to.
 struct SkyEye {
     /// Unit vector to the sun, y up at the eye.
@@ -27,6 +37,8 @@ struct SkyEye {
     scale: f32,
     /// Angular radius of the sun [rad].
     sun_angular_radius: f32,
+    /// 1 when the table of the sky shows the ground in directions below the horizon, else 0.
+    shows_ground: u32,
 }
 
 /// A direction's place in the tables of an eye.
@@ -39,6 +51,8 @@ struct SkyPlace {
     below: bool,
     /// Cosine of the angle to the sun.
     nu: f32,
+    /// Length of the ray in the air over the air's thickness, which the table of the sky is divided by; 1 where that shows the ground.
+    reach: f32,
 }
 
 /// Azimuth coordinate of a direction with the horizontal part `aside`.
@@ -47,6 +61,36 @@ struct SkyPlace {
 fn azimuth_place(eye: SkyEye, aside: vec2<f32>) -> f32 {
     let both = dot(aside, aside) * dot(eye.to_sun.xz, eye.to_sun.xz);
     return 0.5 - 0.5 * clamp(dot(aside, eye.to_sun.xz) * inverseSqrt(max(both, 1e-20)), -1.0, 1.0);
+}
+
+/// Bends a zenith cosine of the sun, so that coordinates are dense at the terminator.
+///
+/// internal
+fn bend_terminator(mu: f32) -> f32 {
+    let beyond = mu - TERMINATOR;
+    return sign(beyond) * log(1.0 + abs(beyond) / TERMINATOR_BEND);
+}
+
+/// Zenith cosines of the sun where a ray from an eye above the air meets the ground or runs lowest: half the difference between towards the sun and away
+/// from it, and the mean. The ray has the zenith sine `sine` and cosine `mu` and runs as low as `lowest`.
+///
+/// internal
+fn seen_suns(eye: SkyEye, sine: f32, mu: f32, lowest: f32) -> vec2<f32> {
+    let r = eye.ground_radius + eye.altitude;
+    let half_ground = sqrt(max(-lowest * (2.0 * eye.ground_radius + lowest), 0.0));
+    let t = -r * mu - half_ground;
+    let below = lowest < 0.0;
+    let away = select(-mu, min(t * sine / eye.ground_radius, 1.0), below);
+    let along = select(sine, (r + t * mu) / eye.ground_radius, below);
+    return vec2<f32>(length(eye.to_sun.xz) * away, eye.to_sun.y * along);
+}
+
+/// Ends of the bent coordinate, towards the sun and away from it; what is far behind the terminator is left out.
+///
+/// internal
+fn sun_ends(suns: vec2<f32>) -> vec2<f32> {
+    let first = suns.y + suns.x;
+    return vec2<f32>(bend_terminator(first), bend_terminator(max(suns.y - suns.x, min(first - 1e-3, DARKEST_SUN))));
 }
 
 /// Place of a unit vector `dir` in the tables of an eye within the air.
@@ -66,7 +110,17 @@ fn sky_place_inside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
     let flat = inverseSqrt(max(dot(eye.to_sun.xz, eye.to_sun.xz), 1e-20));
     let azimuth = clamp(dot(dir.xz, eye.to_sun.xz) * (over * flat), -1.0, 1.0);
     let y = sqrt(max(1.0 - min(ratio, 1.0 / ratio), 0.0));
-    return SkyPlace(0.5 - 0.5 * azimuth, y, ratio > 1.0, dot(dir, eye.to_sun));
+    let below = ratio > 1.0;
+    let along = (eye.ground_radius + eye.altitude) * dir.y;
+    let level = select(eye.top, 0.0, below);
+    let gain = (level - eye.altitude) * (2.0 * eye.ground_radius + eye.altitude + level);
+    let root = sqrt(max(along * along + gain, 0.0));
+    var length = max(abs(gain) / max(root + abs(along), 1e-20), 0.0);
+    if !below && along < 0.0 {
+        length = root - along;
+    }
+    let reach = select(length / eye.top, 1.0, below && eye.shows_ground != 0u);
+    return SkyPlace(0.5 - 0.5 * azimuth, y, below, dot(dir, eye.to_sun), reach);
 }
 
 /// Place of a unit vector `dir` in the tables of an eye above the air.
@@ -82,8 +136,19 @@ fn sky_place_outside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
     let lowest = tangent_altitude(eye.ground_radius, eye.altitude, dir);
     let nadir = length(dir.xz) / (1.0 - dir.y) * eye.horizon;
     let below = lowest < 0.0 && dir.y < 0.0;
-    let y = select(select(4.0, lowest / eye.top, dir.y < 0.0), 1.0 - nadir, below);
-    return SkyPlace(azimuth_place(eye, dir.xz), sqrt(clamp(y, 0.0, 4.0)), below, dot(dir, eye.to_sun));
+    let share = lowest / eye.top;
+    let limb = select(4.0, share / (1.0 + sqrt(max(1.0 - share, 0.0))), dir.y < 0.0 && share <= 1.0);
+    let y = select(limb, 1.0 - nadir, below);
+    let sine = length(dir.xz);
+    let suns = seen_suns(eye, sine, dir.y, lowest);
+    let ends = sun_ends(suns);
+    let cosine = dot(dir.xz, eye.to_sun.xz) * inverseSqrt(max(dot(dir.xz, dir.xz) * dot(eye.to_sun.xz, eye.to_sun.xz), 1e-20));
+    let x = (ends.x - bend_terminator(suns.y + suns.x * clamp(cosine, -1.0, 1.0))) / max(ends.x - ends.y, 1e-6);
+    let half_top = sqrt(max((eye.top - lowest) * (2.0 * eye.ground_radius + eye.top + lowest), 0.0));
+    let half_ground = sqrt(max(-lowest * (2.0 * eye.ground_radius + lowest), 0.0));
+    let globe = select((2.0 * eye.ground_radius + eye.top) / (half_top + half_ground), 1.0, eye.shows_ground != 0u);
+    let reach = select(select(2.0 * half_top / eye.top, 0.0, limb > 1.0), globe, below);
+    return SkyPlace(clamp(x, 0.0, 1.0), sqrt(clamp(y, 0.0, 4.0)), below, dot(dir, eye.to_sun), reach);
 }
 
 /// Place of a unit vector `dir` in the tables of an eye.
@@ -117,8 +182,10 @@ fn sky_direction(eye: SkyEye, place: vec2<f32>, below: bool) -> vec3<f32> {
     let ratio = 1.0 - y * y;
     var sine = 0.0;
     var mu = 0.0;
+    var azimuth = clamp(1.0 - 2.0 * place.x, -1.0, 1.0);
+    var lowest = 0.0;
     if eye.altitude > eye.top && !below {
-        let lowest = eye.top * y * y;
+        lowest = eye.top * (y * y) * (2.0 - y * y);
         sine = (eye.ground_radius + lowest) / (eye.ground_radius + eye.altitude);
         mu = -sqrt(max((eye.altitude - lowest) * (2.0 * eye.ground_radius + eye.altitude + lowest), 0.0)) / (eye.ground_radius + eye.altitude);
     } else {
@@ -126,8 +193,16 @@ fn sky_direction(eye: SkyEye, place: vec2<f32>, below: bool) -> vec3<f32> {
         sine = 2.0 * half / (1.0 + half * half);
         mu = (1.0 - half * half) / (1.0 + half * half);
         mu = select(mu, -mu, below);
+        let square = 1.0 / (eye.horizon * eye.horizon);
+        lowest = -eye.ground_radius * (y * y) * (1.0 - square * ratio) / (1.0 + square * ratio * ratio);
     }
-    let azimuth = clamp(1.0 - 2.0 * place.x, -1.0, 1.0);
+    if eye.altitude > eye.top {
+        let suns = seen_suns(eye, sine, mu, lowest);
+        let ends = sun_ends(suns);
+        let bent = mix(ends.x, ends.y, place.x);
+        let sun = TERMINATOR + sign(bent) * TERMINATOR_BEND * (exp(abs(bent)) - 1.0);
+        azimuth = clamp((sun - suns.y) / max(suns.x, 1e-6), -1.0, 1.0);
+    }
     let across = sqrt(max(1.0 - azimuth * azimuth, 0.0));
     let flat = length(eye.to_sun.xz);
     let ahead = select(vec2<f32>(0.0, -1.0), eye.to_sun.xz / max(flat, 1e-20), flat > 1e-10);
@@ -162,6 +237,28 @@ fn sky_row(eye: SkyEye, y: f32, below: bool, rows: f32) -> f32 {
     return (first + min(y, 1.0) * (count - 1.0) + 0.5) / rows;
 }
 
+/// What the table of the sky holds for an eye above the air: a logarithm, because such an eye sees noon and night at once.
+///
+/// domain  light in [0, 100] 1 lin
+/// range   [-24, 7] 1
+/// error   1e-5 abs of reference::air_tables::encode_dusk
+/// outside undefined
+/// source  ours
+fn encode_dusk(light: vec3<f32>) -> vec3<f32> {
+    return log2(max(light, vec3<f32>(0.0)) + DUSK);
+}
+
+/// The inverse of `encode_dusk`.
+///
+/// domain  code in [-24, 7] 1 lin
+/// range   [0, 130] 1
+/// error   1e-5 abs of reference::air_tables::decode_dusk
+/// outside undefined
+/// source  as encode_dusk
+fn decode_dusk(code: vec3<f32>) -> vec3<f32> {
+    return max(exp2(code) - DUSK, vec3<f32>(0.0));
+}
+
 /// Radiance of the sky, or of the air before the ground, for a sun of irradiance 1 and without its disc, read from the table.
 ///
 /// domain  place.x in [0, 1] 1 lin
@@ -176,6 +273,9 @@ fn sky_radiance(sky: texture_2d_array<f32>, linear: sampler, air: Air, eye: SkyE
     let at = vec2<f32>((place.x * (size.x - 1.0) + 0.5) / size.x, sky_row(eye, place.y, place.below, size.y));
     let smooth_light = textureSampleLevel(sky, linear, at, 0, 0.0).rgb;
     let peaked = textureSampleLevel(sky, linear, at, 1, 0.0).rgb;
-    let within = select(1.0, 0.0, place.y > 1.0);
-    return (smooth_light + peaked * peak_phase(air, place.nu)) * (within / eye.scale);
+    let factor = place.reach / eye.scale;
+    if eye.altitude > eye.top {
+        return (decode_dusk(smooth_light) + decode_dusk(peaked) * peak_phase(air, place.nu)) * factor;
+    }
+    return (smooth_light + peaked * peak_phase(air, place.nu)) * factor;
 }

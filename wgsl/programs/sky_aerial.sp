@@ -79,7 +79,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
         textureStore(light, id.xy, slice, vec4<f32>(mean_smooth * factor, 1.0));
         textureStore(light, id.xy, slices + slice, vec4<f32>(mean_peaked * factor, 1.0));
         if id.x == 0u {
-            textureStore(depths, vec2<u32>(u32(slice), id.y), vec4<f32>(mean_depth * air.top, 1.0));
+            textureStore(depths, vec2<u32>(u32(slice), id.y), vec4<f32>(log2(max(mean_depth * air.top, vec3<f32>(1e-12))), 1.0));
         }
         t = end;
     }

@@ -8,6 +8,7 @@ Light along given rays of one eye, read from its tables. Nothing is drawn.
 #import veduta::atmosphere::ray::{air_ray}
 #import veduta::atmosphere::sky_view::{SkyEye, sky_place, sky_radiance}
 #import veduta::atmosphere::aerial::{aerial_light}
+#import veduta::atmosphere::columns::{sun_depth}
 #import veduta::atmosphere::scatter::{scatter_along, scattered_radiance}
 
 // Steps of a march along every ray through the tables of the air alone; 0: the tables of the eye are read.
@@ -55,6 +56,9 @@ fn probe(@builtin(global_invocation_id) id: vec3<u32>) {
     let place = sky_place(eye, dir);
     var found = aerial_light(light, depths, linear, air, eye, place, t, ray.length);
     if t >= ray.length {
+        if ray.meets_ground == 0u {
+            found.transmittance = exp(-sun_depth(columns, linear, air, ray.altitude, ray.mu));
+        }
         found.in_scatter = sky_radiance(sky, linear, air, eye, place);
     }
     results[id.x] = ProbeLight(found.in_scatter, found.transmittance);

@@ -9,7 +9,7 @@ The table of the sky as one eye sees it: every direction that leaves the air. Ma
 #import veduta::atmosphere::columns::{texel_coordinates, sun_depth, sun_above_horizon}
 #import veduta::atmosphere::diffuse::{diffuse_moments, level_irradiance}
 #import veduta::atmosphere::scatter::{scatter_along}
-#import veduta::atmosphere::sky_view::{SkyEye, sky_direction, sky_rows}
+#import veduta::atmosphere::sky_view::{SkyEye, encode_dusk, sky_direction, sky_place, sky_rows}
 
 override SKY_STEPS: i32 = 12;
 override ALL_ORDERS: i32 = 1;
@@ -42,8 +42,15 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
         let around = level_irradiance(diffuse_moments(moments, linear, air.top, 0.0, sun_mu));
         light.smooth_light += light.transmittance * air.ground_albedo * (0.31830989 * (sun + around));
     }
-    textureStore(sky, id.xy, 0, vec4<f32>(light.smooth_light * eye.scale, 1.0));
-    textureStore(sky, id.xy, 1, vec4<f32>(light.peaked_light * eye.scale, 1.0));
+    let factor = eye.scale / max(sky_place(eye, dir).reach, 1e-9);
+    var smooth_light = light.smooth_light * factor;
+    var peaked_light = light.peaked_light * factor;
+    if eye.altitude > eye.top {
+        smooth_light = encode_dusk(smooth_light);
+        peaked_light = encode_dusk(peaked_light);
+    }
+    textureStore(sky, id.xy, 0, vec4<f32>(smooth_light, 1.0));
+    textureStore(sky, id.xy, 1, vec4<f32>(peaked_light, 1.0));
 }
     }#
 }#
