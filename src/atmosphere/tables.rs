@@ -460,6 +460,7 @@ impl SkyTables {
             "sky_aerial",
             &[
                 ("AERIAL_STEPS", f64::from(quality.aerial_steps)),
+                ("AERIAL_SLICES", f64::from(quality.aerial_slices)),
                 ("ALL_ORDERS", all),
             ],
         )?;

@@ -14,6 +14,7 @@ invocation marches one direction from the eye to its end and leaves a texel at e
 
 override ALL_ORDERS: i32 = 1;
 override AERIAL_STEPS: i32 = 1;
+override AERIAL_SLICES: i32 = 24;
 
 @group(0) @binding(0) var<uniform> air: Air;
 @group(0) @binding(1) var<uniform> eye: SkyEye;
@@ -29,7 +30,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= size.x || id.y >= size.y {
         return;
     }
-    let slices = i32(textureNumLayers(light)) / 2;
+    let slices = AERIAL_SLICES;
     let half = size.y / 2u;
     let below = id.y >= half;
     let place = texel_coordinates(vec2<f32>(f32(id.x), f32(id.y % half)), vec2<f32>(f32(size.x), f32(half)));
