@@ -277,6 +277,7 @@ pub(super) fn compute(
 pub struct SkyTables {
     atmosphere: Atmosphere,
     quality: SkyQuality,
+    shows_ground: bool,
     air: wgpu::Buffer,
     eye: wgpu::Buffer,
     sampler: wgpu::Sampler,
@@ -481,6 +482,7 @@ impl SkyTables {
         Ok(SkyTables {
             atmosphere: atmosphere.clone(),
             quality: *quality,
+            shows_ground: ground,
             air,
             eye,
             sampler,
@@ -602,6 +604,7 @@ impl SkyTables {
             top: self.atmosphere.thickness as f32,
             scale: table_scale(&self.atmosphere, eye.altitude, to_sun[1]),
             sun_angular_radius: eye.sun_angular_radius as f32,
+            shows_ground: u32::from(self.shows_ground),
             ..EyeBlock::ZERO
         }
     }

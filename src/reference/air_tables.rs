@@ -301,6 +301,8 @@ pub struct SkyEye {
     pub scale: f64,
     /// Angular radius of the sun.
     pub sun_angular_radius: f64,
+    /// 1 when the table of the sky shows the ground, else 0.
+    pub shows_ground: u32,
 }
 
 /// A direction's place in the tables of an eye.
@@ -314,36 +316,99 @@ pub struct SkyPlace {
     pub below: bool,
     /// Cosine of the angle to the sun.
     pub nu: f64,
+    /// Length of the ray in the air over the air's thickness; 1 where the table shows the ground.
+    pub reach: f64,
+}
+
+/// Cosine of the azimuth from the sun; 0 for a vertical direction.
+fn azimuth_cosine(eye: &SkyEye, dir: [f64; 3]) -> f64 {
+    let [sx, _, sz] = eye.to_sun;
+    let across = (dir[0].hypot(dir[2]) * sx.hypot(sz)).max(1e-10);
+    ((dir[0] * sx + dir[2] * sz) / across).clamp(-1.0, 1.0)
+}
+
+fn reach(eye: &SkyEye, dir: [f64; 3], below: bool) -> f64 {
+    if below && eye.shows_ground != 0 {
+        return 1.0;
+    }
+    let (radius, top) = (eye.ground_radius, eye.top);
+    let infinity = f64::INFINITY;
+    air_ray::air_ray(radius, top, eye.altitude, dir, eye.to_sun, infinity).length / top
+}
+
+/// Place of a direction in the tables of an eye within the air.
+pub fn sky_place_inside(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
+    // The tangent of half the zenith angle, over that of the horizon.
+    let half = 0.5 * dir[0].hypot(dir[2]).max(1e-10).atan2(dir[1]);
+    let ratio = half.tan() / eye.horizon;
+    SkyPlace {
+        x: 0.5 * (1.0 - azimuth_cosine(&eye, dir)),
+        y: (1.0 - ratio.min(1.0 / ratio)).max(0.0).sqrt(),
+        below: ratio > 1.0,
+        nu: dot(dir, eye.to_sun),
+        reach: reach(&eye, dir, ratio > 1.0),
+    }
+}
+
+const TERMINATOR_BEND: f64 = 0.1;
+const TERMINATOR: f64 = -0.1;
+const DARKEST_SUN: f64 = -0.45;
+const DUSK: f64 = 1.0 / 16_777_216.0;
+
+fn bend_terminator(mu: f64) -> f64 {
+    let beyond = mu - TERMINATOR;
+    (beyond.abs() / TERMINATOR_BEND).ln_1p().copysign(beyond)
+}
+
+/// How the zenith cosine of the sun, where a ray meets the ground or runs lowest, follows from the cosine of its azimuth: factor
+/// and offset.
+fn seen_suns(eye: &SkyEye, zenith: f64, lowest: f64) -> [f64; 2] {
+    let r = eye.ground_radius + eye.altitude;
+    let (sine, cosine) = zenith.sin_cos();
+    let t = -r * cosine - (-lowest * (2.0 * eye.ground_radius + lowest)).max(0.0).sqrt();
+    let angle = (t * sine).atan2(r + t * cosine);
+    let flat = eye.to_sun[0].hypot(eye.to_sun[2]);
+    [flat * angle.sin(), eye.to_sun[1] * angle.cos()]
+}
+
+/// The bent zenith cosines at both ends of a row.
+fn sun_ends([factor, offset]: [f64; 2]) -> [f64; 2] {
+    let first = offset + factor;
+    let last = (offset - factor).max((first - 1e-3).min(DARKEST_SUN));
+    [bend_terminator(first), bend_terminator(last)]
+}
+
+/// Place of a direction in the tables of an eye above the air.
+pub fn sky_place_outside(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
+    let lowest = air_ray::tangent_altitude(eye.ground_radius, eye.altitude, dir);
+    let below = lowest < 0.0 && dir[1] < 0.0;
+    let [cosine, sine] = air_ray::zenith_parts(dir);
+    let zenith = sine.atan2(cosine);
+    let y = if below {
+        1.0 - (0.5 * (PI - zenith)).tan() * eye.horizon
+    } else if dir[1] < 0.0 && lowest <= eye.top {
+        1.0 - (1.0 - lowest / eye.top).sqrt()
+    } else {
+        4.0
+    };
+    let suns = seen_suns(&eye, zenith, lowest);
+    let ends = sun_ends(suns);
+    let sun = bend_terminator(suns[1] + suns[0] * azimuth_cosine(&eye, dir));
+    SkyPlace {
+        x: ((ends[0] - sun) / (ends[0] - ends[1]).max(1e-6)).clamp(0.0, 1.0),
+        y: y.clamp(0.0, 4.0).sqrt(),
+        below,
+        nu: dot(dir, eye.to_sun),
+        reach: if y > 1.0 { 0.0 } else { reach(&eye, dir, below) },
+    }
 }
 
 /// Place of a direction in the tables of an eye.
 pub fn sky_place(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
-    let [dx, dy, dz] = dir;
-    let [sx, _, sz] = eye.to_sun;
-    let across = (dx.hypot(dz) * sx.hypot(sz)).max(1e-10);
-    let azimuth = ((dx * sx + dz * sz) / across).clamp(-1.0, 1.0);
-    // The tangent of half the zenith angle, over that of the horizon.
-    let half = 0.5 * dx.hypot(dz).atan2(dy);
-    let ratio = half.tan() / eye.horizon;
-    let lowest = air_ray::tangent_altitude(eye.ground_radius, eye.altitude, dir);
-    let (below, y) = if eye.altitude > eye.top && dy < 0.0 {
-        let below = lowest < 0.0;
-        (
-            below,
-            if below {
-                1.0 - 1.0 / ratio
-            } else {
-                lowest / eye.top
-            },
-        )
+    if eye.altitude > eye.top {
+        sky_place_outside(eye, dir)
     } else {
-        (ratio > 1.0, 1.0 - ratio.min(1.0 / ratio))
-    };
-    SkyPlace {
-        x: 0.5 * (1.0 - azimuth),
-        y: y.clamp(0.0, 1.0).sqrt(),
-        below,
-        nu: dot(dir, eye.to_sun),
+        sky_place_inside(eye, dir)
     }
 }
 
@@ -351,15 +416,31 @@ pub fn sky_place(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
 pub fn sky_direction(eye: SkyEye, place: [f64; 2], below: bool) -> [f64; 3] {
     let y = place[1].max(f64::from(4e-3_f32));
     let ratio = 1.0 - y * y;
-    let zenith = if eye.altitude > eye.top && !below {
-        let sine = (eye.ground_radius + eye.top * y * y) / (eye.ground_radius + eye.altitude);
-        PI - sine.min(1.0).asin()
+    let r = eye.ground_radius + eye.altitude;
+    let above = eye.altitude > eye.top;
+    let zenith = if above && !below {
+        let lowest = eye.top * (1.0 - ratio * ratio);
+        PI - ((eye.ground_radius + lowest) / r).min(1.0).asin()
     } else if below {
         PI - 2.0 * (ratio / eye.horizon).atan()
     } else {
         2.0 * (ratio * eye.horizon).atan()
     };
-    let cosine = (1.0 - 2.0 * place[0]).clamp(-1.0, 1.0);
+    let mut cosine = (1.0 - 2.0 * place[0]).clamp(-1.0, 1.0);
+    if above {
+        // The horizon's own nadir angle stands for the radius of the ground.
+        let lowest = if below {
+            let horizon = 2.0 * (1.0 / eye.horizon).atan();
+            eye.ground_radius * (zenith.sin() / horizon.sin() - 1.0)
+        } else {
+            eye.top * (1.0 - ratio * ratio)
+        };
+        let suns = seen_suns(&eye, zenith, lowest);
+        let ends = sun_ends(suns);
+        let bent = ends[0] + (ends[1] - ends[0]) * place[0];
+        let sun = TERMINATOR + (TERMINATOR_BEND * bent.abs().exp_m1()).copysign(bent);
+        cosine = ((sun - suns[1]) / suns[0].max(1e-6)).clamp(-1.0, 1.0);
+    }
     let around = eye.to_sun[2].hypot(eye.to_sun[0]);
     let ahead = if around > 1e-10 {
         eye.to_sun[2].atan2(eye.to_sun[0])
@@ -374,12 +455,22 @@ pub fn sky_direction(eye: SkyEye, place: [f64; 2], below: bool) -> [f64; 3] {
     ]
 }
 
+/// The code of light in the table of the sky of an eye above the air.
+pub fn encode_dusk(light: [f64; 3]) -> [f64; 3] {
+    light.map(|l| (l.max(0.0) + DUSK).log2())
+}
+
+/// The light of a code.
+pub fn decode_dusk(code: [f64; 3]) -> [f64; 3] {
+    code.map(|c| (c.exp2() - DUSK).max(0.0))
+}
+
 /// Rows of the table of the sky above the horizon.
 pub fn sky_rows(eye: SkyEye, rows: f64) -> f64 {
     if eye.altitude > eye.top {
         (rows / 3.0).floor()
     } else {
-        rows
+        (0.75 * rows).floor()
     }
 }
 
@@ -391,14 +482,14 @@ pub fn sky_row(eye: SkyEye, y: f64, below: bool, rows: f64) -> f64 {
     } else {
         (0.0, above)
     };
-    (first + y * (count - 1.0) + 0.5) / rows
+    (first + y.min(1.0) * (count - 1.0) + 0.5) / rows
 }
 
 /// Row of the tables of the air before things.
 pub fn aerial_row(y: f64, below: bool, rows: f64) -> f64 {
     let half = 0.5 * rows;
     let first = if below { half } else { 0.0 };
-    (first + y * (half - 1.0) + 0.5) / rows
+    (first + y.min(1.0) * (half - 1.0) + 0.5) / rows
 }
 
 /// Where on a ray slices are dense.

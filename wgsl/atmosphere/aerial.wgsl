@@ -5,7 +5,7 @@
 //! A texel of the light's table belongs to an azimuth from the sun (x), a height above or depth below the horizon (y: the lower half of the rows is above the
 //! horizon, the upper below) and a slice, and holds radiance scattered in between for a sun of irradiance 1, over the distance and times scale and thickness of the air:
 //! in the first half of the array layers but for peaked light [1/sr], in the second peaked light over the peaked phase function [1]. The table of depths holds, by
-//! slice (x) and height (y), the mean extinction times the thickness of the air [1].
+//! slice (x) and height (y), log2 of the mean extinction times the thickness of the air.
 #define_import_path veduta::atmosphere::aerial
 
 #import veduta::atmosphere::medium::{Air, peak_phase}
@@ -86,7 +86,7 @@ fn aerial_slice(spacing: i32, t: f32, length: f32) -> f32 {
 /// domain  place.y in [0, 1] 1 lin
 /// domain  place.nu in [-1, 1] 1 lin
 /// range   [0, 1e6] 1
-/// error   0.02 rel of reference::air_tables::aerial_depth
+/// error   0.02 rel of reference::sky::Sky::single_scatter
 /// source  ours
 fn aerial_depth(depths: texture_2d<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace, t: f32, length: f32) -> vec3<f32> {
     let reached = clamp(t, 0.0, length);

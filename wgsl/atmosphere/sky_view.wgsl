@@ -4,7 +4,7 @@
 //!
 //! The first rows hold directions above the horizon, the others those below: of an eye within the air the last quarter, of an eye above it the last two thirds.
 //!
-//! A texel holds radiance for a sun of irradiance 1, times the scale of the eye: layer 0 but for peaked light [1/sr], layer 1 peaked light over the peaked
+//! A texel holds radiance for a sun of irradiance 1, over the reach of its direction and times the scale of the eye (of an eye above the air a code of that): layer 0 but for peaked light [1/sr], layer 1 peaked light over the peaked
 //! phase function [1].
 #define_import_path veduta::atmosphere::sky_view
 
@@ -43,7 +43,7 @@ struct SkyEye {
 
 /// A direction's place in the tables of an eye.
 struct SkyPlace {
-    /// Azimuth from the sun: (1 - cos phi) / 2.
+    /// Azimuth from the sun: (1 - cos phi) / 2; of an eye above the air the sun's height where the ray meets the ground or runs lowest, from the highest on.
     x: f32,
     /// Height above, or depth below, the horizon: 0 at the horizon, 1 at zenith, nadir or the top of the air; above 1 for a direction that misses the air.
     y: f32,
@@ -53,14 +53,6 @@ struct SkyPlace {
     nu: f32,
     /// Length of the ray in the air over the air's thickness, which the table of the sky is divided by; 1 where that shows the ground.
     reach: f32,
-}
-
-/// Azimuth coordinate of a direction with the horizontal part `aside`.
-///
-/// internal
-fn azimuth_place(eye: SkyEye, aside: vec2<f32>) -> f32 {
-    let both = dot(aside, aside) * dot(eye.to_sun.xz, eye.to_sun.xz);
-    return 0.5 - 0.5 * clamp(dot(aside, eye.to_sun.xz) * inverseSqrt(max(both, 1e-20)), -1.0, 1.0);
 }
 
 /// Bends a zenith cosine of the sun, so that coordinates are dense at the terminator.
@@ -96,7 +88,7 @@ fn sun_ends(suns: vec2<f32>) -> vec2<f32> {
 /// Place of a unit vector `dir` in the tables of an eye within the air.
 ///
 /// domain  eye.to_sun in [-1, 1] 1 lin
-/// domain  eye.altitude in [0, 1e8] m lin
+/// domain  eye.altitude in [0, eye.top] m lin
 /// domain  dir in [-1, 1] 1 lin
 /// range   [-1, 1] 1
 /// error   1e-3 abs of reference::air_tables::sky_place_inside
@@ -154,7 +146,7 @@ fn sky_place_outside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
 /// Place of a unit vector `dir` in the tables of an eye.
 ///
 /// domain  eye.to_sun in [-1, 1] 1 lin
-/// domain  eye.altitude in [0, 1e5] m lin
+/// domain  eye.altitude in [0, 1e8] m lin
 /// domain  dir in [-1, 1] 1 lin
 /// range   [-1, 2] 1
 /// error   1e-3 abs of reference::air_tables::sky_place

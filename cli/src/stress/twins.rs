@@ -74,6 +74,10 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "single_scattering_from_tables_meets_quadrature",
     ),
     (
+        "veduta::atmosphere::aerial::aerial_depth",
+        "air_before_things_meets_quadrature",
+    ),
+    (
         "veduta::atmosphere::aerial::aerial_light",
         "air_before_things_meets_quadrature",
     ),
@@ -238,7 +242,8 @@ argument!(SkyEye {
     ground_radius: f64,
     top: f64,
     scale: f64,
-    sun_angular_radius: f64
+    sun_angular_radius: f64,
+    shows_ground: u32
 });
 
 impl Argument for CloudLight {
@@ -315,7 +320,7 @@ impl Answer for SplitPhases {
 impl Answer for SkyPlace {
     fn values(self) -> Values {
         let below = f64::from(u8::from(self.below));
-        Values::new(&[self.x, self.y, below, self.nu])
+        Values::new(&[self.x, self.y, below, self.nu, self.reach])
     }
 }
 
@@ -703,6 +708,7 @@ impl Entry {
             .lin("eye.top", 5e4, 2e5)
             .log("eye.scale", 1.0, 1e6)
             .lin("eye.sun_angular_radius", 0.0, 0.1)
+            .lin("eye.shows_ground", 0.0, 1.0)
             .lin("eye.to_sun", -1.0, 1.0)
             .unit("eye.to_sun")
     }
@@ -1287,6 +1293,10 @@ pub fn registry() -> Vec<Entry> {
         "air_tables",
         air_tables,
         sky_place,
+        sky_place_inside,
+        sky_place_outside,
+        encode_dusk,
+        decode_dusk,
         sky_direction,
         sky_rows,
         sky_row
@@ -1666,10 +1676,21 @@ fn particular(entry: Entry) -> Entry {
         ("atmosphere::diffuse", "plane_irradiance") => entry.unit("normal").unit("to_sun"),
         ("atmosphere::scatter", "split_phases") => entry.branch("nu", &[0.999, 0.9999]),
         ("atmosphere::scatter", "step_share") => entry.branch("depth", &[f64::from(0.1_f32), 0.01]),
-        ("atmosphere::sky_view", "sky_place") => entry
-            .eye()
-            .unit("dir")
-            .jumps("directions along the horizon", 1e-6),
+        // How long a ray is near the horizon no f32 says; a test compares it with rays.
+        ("atmosphere::sky_view", "sky_place" | "sky_place_inside" | "sky_place_outside") => {
+            let entry = entry
+                .eye()
+                .lin("eye.top", 5e4, 1e5)
+                .unit("dir")
+                .judged(&["x", "y", "below", "nu"])
+                .jumps("directions along the horizon, and those without an azimuth", 1e-6);
+            match name {
+                "sky_place_inside" => entry.lin("eye.altitude", 0.0, 5e4),
+                "sky_place_outside" => entry.log("eye.altitude", 1.1e5, 1e8),
+                _ => entry,
+            }
+        }
+        ("atmosphere::sky_view", "encode_dusk" | "decode_dusk") => entry,
         ("atmosphere::sky_view", "sky_direction") => entry.eye().jumps("a sun in the zenith", 1e-6),
         ("atmosphere::sky_view", _) => {
             let mut entry = entry.eye();
