@@ -20,6 +20,7 @@ fn main() {
         "sky_view",
         "sky_aerial",
         "sky_probe",
+        "sky_query",
         "probe",
     ] {
         build = build.variant(program, ["AIR_EIGHT_LANES"]);

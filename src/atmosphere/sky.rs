@@ -340,8 +340,8 @@ impl Sky {
             sun_angular_radius: f64::from(view.sun.angular_radius),
         };
         let block = self.draw_block(view)?;
-        self.outside = eye.altitude as f32 > self.tables.atmosphere().thickness as f32;
         let mut work = self.tables.prepare(queue, encoder, &eye)?;
+        self.outside = eye.altitude as f32 > self.tables.atmosphere().thickness as f32;
         let bytes = block.to_bytes().to_vec();
         if bytes != self.draw_bytes {
             queue.write_buffer(&self.draw, 0, &bytes);
@@ -377,6 +377,16 @@ impl Sky {
         } else {
             view.rays()?
         };
+        // Depth falls with distance when it is reversed.
+        let falls = if parallel { scale > 0.0 } else { offset > 0.0 };
+        let reads_depth = self.composition != SkyComposition::Background;
+        if reads_depth && falls != (self.targets.depth != Depth::Normal) {
+            return Err(Error::OutOfDomain {
+                name: "view.projection".to_owned(),
+                value: format!("{:?}", projection.to_cols_array()),
+                domain: format!("one with the depth of the targets, {:?}", self.targets.depth),
+            });
+        }
         let colour = self.tables.atmosphere().sun.colour;
         let colour = Vec3::from_array(colour.map(|c| c as f32));
         Ok(DrawBlock {
