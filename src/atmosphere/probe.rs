@@ -280,11 +280,8 @@ impl Probe {
     ) -> Result<(), Error> {
         let count = rays.len() / AirRay::SIZE;
         let exchange = Exchange::new(device, queue, rays, count * RESULT);
-        let bound: [&[&wgpu::Buffer]; 3] = [
-            &[],
-            &[&self.air, &exchange.input],
-            &[&exchange.output],
-        ];
+        let bound: [&[&wgpu::Buffer]; 3] =
+            [&[], &[&self.air, &exchange.input], &[&exchange.output]];
         let groups: Vec<wgpu::BindGroup> = self
             .layouts
             .iter()

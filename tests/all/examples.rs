@@ -65,7 +65,10 @@ fn sky_over_host_puts_air_before_the_hosts_things() {
     assert!(sky[2] > sky[0] + 15.0 && ground[1] > ground[2] + 15.0);
     let dusk = draw(2.0, 2.0, 0.0);
     let dark = mean(&dusk, [30, 45]);
-    assert!(dark.iter().zip(ground).all(|(a, b)| *a < 0.6 * b), "{dark:?}");
+    assert!(
+        dark.iter().zip(ground).all(|(a, b)| *a < 0.6 * b),
+        "{dark:?}"
+    );
     // From above, the air turns what lies far away blue, and space is black.
     let high = draw(10_000.0, 40.0, -8.0);
     let (far, near) = (mean(&high, [40, 28]), mean(&high, [40, 50]));

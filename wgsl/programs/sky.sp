@@ -50,7 +50,7 @@ struct SkyDraw {
 // A square around the sun's disc: two triangles.
 @vertex
 fn cover(@builtin(vertex_index) index: u32) -> Corner {
-    let side = vec2<f32>(select(-1.0, 1.0, (index & 1u) == 1u), select(-1.0, 1.0, index == 2u || index == 3u || index == 5u));
+    let side = vec2<f32>(select(-1.0, 1.0, (index & 1u) == 1u), select(-1.0, 1.0, index >= 2u && index <= 4u));
     let to_sun = eye.to_sun;
     let ahead = dot(to_sun, draw_view.forward);
     let aside = to_sun / max(ahead, 1e-6) - draw_view.ray_middle;
@@ -166,7 +166,12 @@ fn before(ray_at: vec3<f32>, seen: f32) -> AirLight {
     if ray.length <= 0.0 {
         return AirLight(vec3<f32>(0.0), vec3<f32>(1.0));
     }
-    return aerial_light(light, depths, linear, air, eye, place, distance - ray.from_eye, ray.length);
+    var front = aerial_light(light, depths, linear, air, eye, place, distance - ray.from_eye, ray.length);
+    if distance - ray.from_eye >= ray.length && !place.below {
+        // Beyond the air: no seam with the sky beside it.
+        front.in_scatter = background(dir);
+    }
+    return front;
 }
 #endif
 
