@@ -135,26 +135,34 @@ impl Gpu {
     /// # Errors
     /// [`Error::Device`] when the device is lost or the buffer cannot be mapped.
     pub fn read_staging(&self, staging: &wgpu::Buffer) -> Result<Vec<u8>, Error> {
-        let (sender, receiver) = std::sync::mpsc::channel();
-        staging.slice(..).map_async(wgpu::MapMode::Read, move |r| {
-            // The receiver lives until the answer has come; a closed channel means that nobody wants it.
-            let _ = sender.send(r);
-        });
-        self.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| Error::Device(e.to_string()))?;
-        receiver
-            .recv()
-            .map_err(|e| Error::Device(e.to_string()))?
-            .map_err(|e| Error::Device(e.to_string()))?;
-        let data = staging
-            .slice(..)
-            .get_mapped_range()
-            .map_err(|e| Error::Device(e.to_string()))?
-            .to_vec();
-        staging.unmap();
-        Ok(data)
+        read_staging(&self.device, staging)
     }
+}
+
+/// Reads a buffer that has `MAP_READ` usage, blocking until the device has finished.
+pub(crate) fn read_staging(
+    device: &wgpu::Device,
+    staging: &wgpu::Buffer,
+) -> Result<Vec<u8>, Error> {
+    let (sender, receiver) = std::sync::mpsc::channel();
+    staging.slice(..).map_async(wgpu::MapMode::Read, move |r| {
+        // The receiver lives until the answer has come; a closed channel means that nobody wants it.
+        let _ = sender.send(r);
+    });
+    device
+        .poll(wgpu::PollType::wait_indefinitely())
+        .map_err(|e| Error::Device(e.to_string()))?;
+    receiver
+        .recv()
+        .map_err(|e| Error::Device(e.to_string()))?
+        .map_err(|e| Error::Device(e.to_string()))?;
+    let data = staging
+        .slice(..)
+        .get_mapped_range()
+        .map_err(|e| Error::Device(e.to_string()))?
+        .to_vec();
+    staging.unmap();
+    Ok(data)
 }
 
 #[cfg(feature = "compose")]

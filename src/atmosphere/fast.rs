@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::program::ProgramSet;
 
 use super::Atmosphere;
+use super::exchange::{Exchange, three};
 use super::probe::{ProbeLight, ProbeRay};
 use super::tables::{Eye, SkyQuality, SkyTables, bind_groups, compute};
 
@@ -111,24 +112,7 @@ impl FastProbe {
         rays: &[u8],
     ) -> Result<Vec<ProbeLight>, Error> {
         let count = rays.len() / RAY;
-        let size = (count * RESULT) as u64;
-        let buffer = |label, size, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
-        use wgpu::BufferUsages as Usage;
-        let input = buffer(
-            "veduta rays",
-            rays.len() as u64,
-            Usage::STORAGE | Usage::COPY_DST,
-        );
-        queue.write_buffer(&input, 0, rays);
-        let output = buffer("veduta results", size, Usage::STORAGE | Usage::COPY_SRC);
-        let staging = buffer("veduta read back", size, Usage::COPY_DST | Usage::MAP_READ);
+        let exchange = Exchange::new(device, queue, rays, count * RESULT);
         let mut encoder = device.create_command_encoder(&Default::default());
         let _ = self.tables.prepare(queue, &mut encoder, eye)?;
         let tables = &self.tables;
@@ -147,43 +131,15 @@ impl FastProbe {
                     (1, view(tables.sky())),
                     (2, view(tables.aerial())),
                     (3, view(tables.aerial_depths())),
-                    (4, input.as_entire_binding()),
+                    (4, exchange.input.as_entire_binding()),
                     (5, view(tables.columns())),
                     (6, view(tables.diffuse())),
                 ],
-                &[(0, output.as_entire_binding())],
+                &[(0, exchange.output.as_entire_binding())],
             ],
         );
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&self.pipeline);
-            for (group, index) in groups.iter().zip(0..) {
-                pass.set_bind_group(index, group, &[]);
-            }
-            pass.dispatch_workgroups((count as u32).div_ceil(WORKGROUP), 1, 1);
-        }
-        encoder.copy_buffer_to_buffer(&output, 0, &staging, 0, size);
-        queue.submit([encoder.finish()]);
-        let (sender, receiver) = std::sync::mpsc::channel();
-        staging.slice(..).map_async(wgpu::MapMode::Read, move |r| {
-            // The receiver lives until the answer has come.
-            let _ = sender.send(r);
-        });
-        let lost = |e: &dyn std::fmt::Display| Error::Device(e.to_string());
-        device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| lost(&e))?;
-        receiver
-            .recv()
-            .map_err(|e| lost(&e))?
-            .map_err(|e| lost(&e))?;
-        let data = staging.slice(..).get_mapped_range().map_err(|e| lost(&e))?;
-        let three = |result: &[u8], at: usize| {
-            [0, 4, 8].map(|k| {
-                let b = &result[at + k..at + k + 4];
-                f32::from_le_bytes([b[0], b[1], b[2], b[3]])
-            })
-        };
+        let workgroups = (count as u32).div_ceil(WORKGROUP);
+        let data = exchange.run(device, queue, encoder, &self.pipeline, &groups, workgroups)?;
         Ok(data
             .chunks_exact(RESULT)
             .map(|result| ProbeLight {

@@ -1,6 +1,7 @@
 //! Radiance and transmittance along given rays: a query, not a part of a frame.
 
 use super::check::{fault, within};
+use super::exchange::{Exchange, three};
 use super::fast::FastProbe;
 use super::medium::Atmosphere;
 use super::ray::AirRay;
@@ -278,32 +279,9 @@ impl Probe {
         results: &mut Vec<ProbeLight>,
     ) -> Result<(), Error> {
         let count = rays.len() / AirRay::SIZE;
-        let size = (count * RESULT) as u64;
-        let buffer = |label, size, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
-        let input = buffer(
-            "veduta probe rays",
-            rays.len() as u64,
-            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-        );
-        queue.write_buffer(&input, 0, rays);
-        let output = buffer(
-            "veduta probe results",
-            size,
-            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-        );
-        let staging = buffer(
-            "veduta probe read back",
-            size,
-            wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        );
-        let bound: [&[&wgpu::Buffer]; 3] = [&[], &[&self.air, &input], &[&output]];
+        let exchange = Exchange::new(device, queue, rays, count * RESULT);
+        let bound: [&[&wgpu::Buffer]; 3] =
+            [&[], &[&self.air, &exchange.input], &[&exchange.output]];
         let groups: Vec<wgpu::BindGroup> = self
             .layouts
             .iter()
@@ -323,44 +301,12 @@ impl Probe {
                 })
             })
             .collect();
-        let mut encoder = device.create_command_encoder(&Default::default());
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&self.pipeline);
-            for (group, index) in groups.iter().zip(0..) {
-                pass.set_bind_group(index, group, &[]);
-            }
-            pass.dispatch_workgroups(count.div_ceil(WORKGROUP) as u32, 1, 1);
-        }
-        encoder.copy_buffer_to_buffer(&output, 0, &staging, 0, size);
-        queue.submit([encoder.finish()]);
-        let (sender, receiver) = std::sync::mpsc::channel();
-        staging.slice(..).map_async(wgpu::MapMode::Read, move |r| {
-            // The receiver lives until the answer has come.
-            let _ = sender.send(r);
-        });
-        device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| Error::Device(e.to_string()))?;
-        receiver
-            .recv()
-            .map_err(|e| Error::Device(e.to_string()))?
-            .map_err(|e| Error::Device(e.to_string()))?;
-        let data = staging
-            .slice(..)
-            .get_mapped_range()
-            .map_err(|e| Error::Device(e.to_string()))?;
-        results.extend(data.chunks_exact(RESULT).map(|result| {
-            let three = |at: usize| {
-                [0, 4, 8].map(|k| {
-                    let b = &result[at + k..at + k + 4];
-                    f32::from_le_bytes([b[0], b[1], b[2], b[3]])
-                })
-            };
-            ProbeLight {
-                in_scatter: three(0),
-                transmittance: three(16),
-            }
+        let encoder = device.create_command_encoder(&Default::default());
+        let workgroups = count.div_ceil(WORKGROUP) as u32;
+        let data = exchange.run(device, queue, encoder, &self.pipeline, &groups, workgroups)?;
+        results.extend(data.chunks_exact(RESULT).map(|result| ProbeLight {
+            in_scatter: three(result, 0),
+            transmittance: three(result, 16),
         }));
         Ok(())
     }

@@ -195,7 +195,7 @@ struct Bake {
 }
 
 impl Bake {
-    fn record(&self, encoder: &mut wgpu::CommandEncoder, label: &str) {
+    fn record(&self, encoder: &mut wgpu::CommandEncoder, label: &str, work: &mut Work) {
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some(label),
             ..Default::default()
@@ -205,6 +205,24 @@ impl Bake {
             pass.set_bind_group(index, group, &[]);
         }
         pass.dispatch_workgroups(self.workgroups[0], self.workgroups[1], 1);
+        work.bakes += 1;
+        work.dispatches += 1;
+    }
+}
+
+/// Writes a buffer when its bytes have changed.
+fn upload(
+    queue: &wgpu::Queue,
+    buffer: &wgpu::Buffer,
+    held: &mut Vec<u8>,
+    bytes: Vec<u8>,
+    work: &mut Work,
+) {
+    if *held != bytes {
+        queue.write_buffer(buffer, 0, &bytes);
+        work.writes += 1;
+        work.bytes += bytes.len() as u64;
+        *held = bytes;
     }
 }
 
@@ -544,49 +562,73 @@ impl SkyTables {
         eye: &Eye,
     ) -> Result<Work, Error> {
         eye.check()?;
-        let mut work = Work::default();
-        let mut upload = |buffer: &wgpu::Buffer, held: &mut Vec<u8>, bytes: Vec<u8>| {
-            if *held != bytes {
-                queue.write_buffer(buffer, 0, &bytes);
-                work.writes += 1;
-                work.bytes += bytes.len() as u64;
-                *held = bytes;
-            }
-        };
-        upload(&self.air, &mut self.air_bytes, self.atmosphere.air_bytes()?);
         let block = self.eye_block(eye);
-        upload(&self.eye, &mut self.eye_bytes, block.to_bytes().to_vec());
-        let mut bake = |bake: &Bake, label: &str| {
-            bake.record(encoder, label);
-            work.bakes += 1;
-            work.dispatches += 1;
+        let (mut work, air_anew) = self.air_work(queue, encoder)?;
+        upload(
+            queue,
+            &self.eye,
+            &mut self.eye_bytes,
+            block.to_bytes().to_vec(),
+            &mut work,
+        );
+        let key = EyeKey {
+            altitude: block.altitude,
+            sun_height: block.to_sun[1],
+            sun_angular_radius: block.sun_angular_radius,
         };
+        if air_anew {
+            self.eye_of = None;
+        }
+        if self.eye_of != Some(key) {
+            self.bake_sky.record(encoder, "veduta sky", &mut work);
+            self.bake_aerial
+                .record(encoder, "veduta air before things", &mut work);
+            self.eye_of = Some(key);
+        }
+        Ok(work)
+    }
+
+    /// As [`SkyTables::prepare`], but only what does not depend on an eye: columns and diffuse light.
+    ///
+    /// # Errors
+    /// As [`Atmosphere::check`].
+    pub fn prepare_air(
+        &mut self,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<Work, Error> {
+        let (work, air_anew) = self.air_work(queue, encoder)?;
+        if air_anew {
+            self.eye_of = None;
+        }
+        Ok(work)
+    }
+
+    /// What is made anew of the air, and whether anything was that the tables of an eye depend on.
+    fn air_work(
+        &mut self,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(Work, bool), Error> {
+        let mut work = Work::default();
+        let bytes = self.atmosphere.air_bytes()?;
+        upload(queue, &self.air, &mut self.air_bytes, bytes, &mut work);
         let shape = self.atmosphere.profile_bytes();
-        let columns_anew = self.columns_of.as_ref() != Some(&shape);
-        if columns_anew {
-            bake(&self.bake_columns, "veduta columns");
+        if self.columns_of.as_ref() != Some(&shape) {
+            self.bake_columns
+                .record(encoder, "veduta columns", &mut work);
             self.columns_of = Some(shape);
         }
         let air_anew = self.moments_of.as_ref() != Some(&self.air_bytes);
         if air_anew {
             if self.quality.all_orders {
                 for pass in &self.bake_moments {
-                    bake(pass, "veduta diffuse light");
+                    pass.record(encoder, "veduta diffuse light", &mut work);
                 }
             }
             self.moments_of = Some(self.air_bytes.clone());
         }
-        let key = EyeKey {
-            altitude: block.altitude,
-            sun_height: block.to_sun[1],
-            sun_angular_radius: block.sun_angular_radius,
-        };
-        if air_anew || self.eye_of != Some(key) {
-            bake(&self.bake_sky, "veduta sky");
-            bake(&self.bake_aerial, "veduta air before things");
-            self.eye_of = Some(key);
-        }
-        Ok(work)
+        Ok((work, air_anew))
     }
 
     fn eye_block(&self, eye: &Eye) -> EyeBlock {

@@ -3,6 +3,9 @@
 #[allow(dead_code)] // Its `main` only prints what `draw` returns.
 #[path = "../../examples/host_app.rs"]
 mod host_app;
+#[allow(dead_code)]
+#[path = "../../examples/sky_over_host.rs"]
+mod sky_over_host;
 
 #[test]
 fn host_app_draws_a_landscape_in_under_80_lines() {
@@ -35,4 +38,43 @@ fn host_app_draws_a_landscape_in_under_80_lines() {
         pixels.chunks(4).all(|p| p[3] == 255),
         "every pixel is opaque"
     );
+}
+
+#[test]
+fn sky_over_host_puts_air_before_the_hosts_things() {
+    let size = [96, 54];
+    let draw = |altitude, sun_height, pitch| {
+        let shot = sky_over_host::Shot {
+            altitude,
+            sun_height,
+            pitch,
+        };
+        sky_over_host::draw(size, &shot).unwrap()
+    };
+    let mean = |pixels: &[u8], [x, y]: [usize; 2]| {
+        [0, 1, 2].map(|c| {
+            let sum: u32 = (0..16)
+                .map(|i| u32::from(pixels[4 * (96 * (y + i / 4) + x + i % 4) + c]))
+                .sum();
+            f64::from(sum) / 16.0
+        })
+    };
+    let noon = draw(2.0, 40.0, 0.0);
+    let (sky, ground) = (mean(&noon, [30, 2]), mean(&noon, [30, 45]));
+    println!("sky {sky:.1?}, ground {ground:.1?}");
+    assert!(sky[2] > sky[0] + 15.0 && ground[1] > ground[2] + 15.0);
+    let dusk = draw(2.0, 2.0, 0.0);
+    let dark = mean(&dusk, [30, 45]);
+    assert!(
+        dark.iter().zip(ground).all(|(a, b)| *a < 0.6 * b),
+        "{dark:?}"
+    );
+    // From above, the air turns what lies far away blue, and space is black.
+    let high = draw(10_000.0, 40.0, -8.0);
+    let (far, near) = (mean(&high, [40, 28]), mean(&high, [40, 50]));
+    println!("far {far:.1?}, near {near:.1?}");
+    assert!(far[2] - far[0] > near[2] - near[0] && far[2] > near[2]);
+    let space = draw(200_000.0, 40.0, -25.0);
+    assert!(mean(&space, [40, 2]).iter().all(|v| *v <= 1.0));
+    assert!(mean(&space, [40, 45])[2] > 50.0);
 }

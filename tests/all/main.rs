@@ -19,6 +19,7 @@ mod planet;
 mod probe;
 mod reference;
 mod simplex;
+mod sky;
 mod sweep;
 mod tables;
 mod terrain;

@@ -50,7 +50,7 @@ struct SkyDraw {
 // A square around the sun's disc: two triangles.
 @vertex
 fn cover(@builtin(vertex_index) index: u32) -> Corner {
-    let side = vec2<f32>(select(-1.0, 1.0, (index & 1u) == 1u), select(-1.0, 1.0, index == 2u || index == 3u || index == 5u));
+    let side = vec2<f32>(select(-1.0, 1.0, (index & 1u) == 1u), select(-1.0, 1.0, index >= 2u && index <= 4u));
     let to_sun = eye.to_sun;
     let ahead = dot(to_sun, draw_view.forward);
     let aside = to_sun / max(ahead, 1e-6) - draw_view.ray_middle;
@@ -128,11 +128,11 @@ fn background(dir: vec3<f32>) -> vec3<f32> {
 }
 
 #ifdef AERIAL
-// Radiance of the sun's disc.
+// Radiance of the sun's disc; parallel rays have none, since all would meet it or none.
 fn disc(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
     let place = place_of(dir);
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
-    let seen = select(1.0, 0.0, place.below) * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle);
+    let seen = select(1.0, 0.0, place.below || draw_view.parallel != 0u) * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle);
     return seen * exp(-aerial_depth(depths, linear, air, eye, place, ray.length, ray.length));
 }
 #else
@@ -148,6 +148,11 @@ fn disc(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
 #endif
 
 #ifdef AERIAL
+// Whether there is no air in a direction.
+fn misses(dir: vec3<f32>) -> bool {
+    return EYE_OUTSIDE != 0 && place_of(dir).y > 1.0;
+}
+
 // Light and transmittance before what stands at a depth of the host's depth buffer.
 fn before(ray_at: vec3<f32>, seen: f32) -> AirLight {
     var relative = ray_at * (draw_view.depth_numerator / (seen + draw_view.depth_offset));
@@ -161,7 +166,12 @@ fn before(ray_at: vec3<f32>, seen: f32) -> AirLight {
     if ray.length <= 0.0 {
         return AirLight(vec3<f32>(0.0), vec3<f32>(1.0));
     }
-    return aerial_light(light, depths, linear, air, eye, place, distance - ray.from_eye, ray.length);
+    var front = aerial_light(light, depths, linear, air, eye, place, distance - ray.from_eye, ray.length);
+    if distance - ray.from_eye >= ray.length && !place.below {
+        // Beyond the air: no seam with the sky beside it.
+        front.in_scatter = background(dir);
+    }
+    return front;
 }
 #endif
 
@@ -190,7 +200,8 @@ fn draw(in: Corner) -> Layers {
     let pixel_angle = length(dpdx(dir));
     let seen = textureLoad(depth, vec2<i32>(in.position.xy), 0);
     if seen == draw_view.far_depth {
-        return Layers(vec4<f32>((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance, 1.0), vec4<f32>(0.0, 0.0, 0.0, 1.0));
+        let space = select(0.0, 1.0, misses(dir));
+        return Layers(vec4<f32>((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance, 1.0), vec4<f32>(vec3<f32>(space), 1.0));
     }
     let front = before(in.ray, seen);
     return Layers(vec4<f32>(front.in_scatter * draw_view.sun_irradiance, 1.0), vec4<f32>(front.transmittance, 1.0));
@@ -203,7 +214,9 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     let texel = vec2<i32>(in.position.xy);
     let seen = textureLoad(depth, texel, 0);
     if seen == draw_view.far_depth {
-        return shown((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance, in.position.xy);
+        // Where there is no air the host's picture stays, with its stars.
+        let space = select(vec3<f32>(0.0), textureLoad(picture, texel, 0).rgb, misses(dir));
+        return shown((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance + space, in.position.xy);
     }
     let front = before(in.ray, seen);
     let radiance = front.in_scatter * draw_view.sun_irradiance + front.transmittance * textureLoad(picture, texel, 0).rgb;

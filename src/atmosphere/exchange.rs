@@ -1,0 +1,75 @@
+//! Rows to a compute program and its results back: what every query does.
+
+use crate::error::Error;
+
+/// Storage buffers of one query: rows in, results out.
+pub(super) struct Exchange {
+    /// What the program reads.
+    pub input: wgpu::Buffer,
+    /// What it writes.
+    pub output: wgpu::Buffer,
+}
+
+impl Exchange {
+    /// Uploads rows and makes room for `size` bytes of results.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, rows: &[u8], size: usize) -> Exchange {
+        use wgpu::BufferUsages as Usage;
+        let buffer = |label, size, usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let input = buffer(
+            "veduta rows",
+            rows.len() as u64,
+            Usage::STORAGE | Usage::COPY_DST,
+        );
+        queue.write_buffer(&input, 0, rows);
+        let output = buffer(
+            "veduta results",
+            size as u64,
+            Usage::STORAGE | Usage::COPY_SRC,
+        );
+        Exchange { input, output }
+    }
+
+    /// Records the program after what the encoder holds already, submits, waits and reads the results.
+    pub fn run(
+        self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        mut encoder: wgpu::CommandEncoder,
+        pipeline: &wgpu::ComputePipeline,
+        groups: &[wgpu::BindGroup],
+        workgroups: u32,
+    ) -> Result<Vec<u8>, Error> {
+        let staging = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("veduta read back"),
+            size: self.output.size(),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(pipeline);
+            for (group, index) in groups.iter().zip(0..) {
+                pass.set_bind_group(index, group, &[]);
+            }
+            pass.dispatch_workgroups(workgroups, 1, 1);
+        }
+        encoder.copy_buffer_to_buffer(&self.output, 0, &staging, 0, staging.size());
+        queue.submit([encoder.finish()]);
+        crate::device::read_staging(device, &staging)
+    }
+}
+
+/// Three numbers of a result, `at` bytes from its start.
+pub(super) fn three(result: &[u8], at: usize) -> [f32; 3] {
+    [0, 4, 8].map(|k| {
+        let b = &result[at + k..at + k + 4];
+        f32::from_le_bytes([b[0], b[1], b[2], b[3]])
+    })
+}
