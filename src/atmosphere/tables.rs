@@ -409,7 +409,7 @@ impl SkyTables {
                 device,
                 "veduta columns",
                 &layouts,
-                &[&[air_bound.clone()], &[], &[at(0, &columns)]],
+                &[std::slice::from_ref(&air_bound), &[], &[at(0, &columns)]],
             ),
             workgroups: groups_of(quality.columns, [8, 8]),
         };
@@ -431,7 +431,7 @@ impl SkyTables {
                     "veduta diffuse light",
                     &layouts,
                     &[
-                        &[air_bound.clone()],
+                        std::slice::from_ref(&air_bound),
                         &[
                             linear.clone(),
                             at(1, &columns),
@@ -495,7 +495,6 @@ impl SkyTables {
             ),
             workgroups: groups_of(quality.aerial, [4, 8]),
         };
-        drop(read);
         Ok(SkyTables {
             atmosphere: atmosphere.clone(),
             quality: *quality,

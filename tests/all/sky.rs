@@ -881,8 +881,8 @@ fn light_at_a_place_is_that_of_sun_and_sky() {
             })
             .collect();
         let seen = fast(&Preset::High, true, &rays);
-        for c in 0..3 {
-            let sun = light.sun[c] / through[c] - 1.0;
+        for (c, through) in through.into_iter().enumerate() {
+            let sun = light.sun[c] / through - 1.0;
             let sum: f32 = seen.iter().map(|l| l.in_scatter[c]).sum();
             let truth = sum * std::f32::consts::PI / seen.len() as f32;
             let off = light.sky[c] / truth - 1.0;
