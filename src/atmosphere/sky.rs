@@ -446,14 +446,13 @@ fn draw_block(
         exposure: view.exposure,
         sun_irradiance: (view.sun.irradiance * colour).to_array(),
         parallel: u32::from(parallel),
-        ..DrawBlock::ZERO
     })
 }
 
 #[cfg(test)]
 mod tests {
     use glam::camera::rh::proj::directx;
-    use glam::{DMat4, DVec4, Mat4};
+    use glam::{DVec4, Mat4};
 
     use super::*;
 
