@@ -127,7 +127,8 @@ impl Sky {
             return Err(Error::OutOfDomain {
                 name: "targets.color_format".to_owned(),
                 value: format!("{:?}", targets.color_format),
-                domain: "a float format, since light and transmittance are not for display".to_owned(),
+                domain: "a float format, since light and transmittance are not for display"
+                    .to_owned(),
             });
         }
         let settings = Settings::resolve(programs, &options.preset, None, &[])?;
@@ -145,21 +146,22 @@ impl Sky {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let depth_stencil = targets
-            .depth_format
-            .filter(|_| !reads_depth)
-            .map(|format| wgpu::DepthStencilState {
-                format,
-                depth_write_enabled: Some(false),
-                depth_compare: Some(match targets.depth {
-                    Depth::Normal => wgpu::CompareFunction::LessEqual,
-                    Depth::Reversed | Depth::ReversedInfinite => {
-                        wgpu::CompareFunction::GreaterEqual
-                    }
-                }),
-                stencil: Default::default(),
-                bias: Default::default(),
-            });
+        let depth_stencil =
+            targets
+                .depth_format
+                .filter(|_| !reads_depth)
+                .map(|format| wgpu::DepthStencilState {
+                    format,
+                    depth_write_enabled: Some(false),
+                    depth_compare: Some(match targets.depth {
+                        Depth::Normal => wgpu::CompareFunction::LessEqual,
+                        Depth::Reversed | Depth::ReversedInfinite => {
+                            wgpu::CompareFunction::GreaterEqual
+                        }
+                    }),
+                    stencil: Default::default(),
+                    bias: Default::default(),
+                });
         let format = Some(targets.color_format.into());
         let both = [format.clone(), format];
         let count = 1 + usize::from(options.composition == SkyComposition::TwoTargets);
@@ -318,7 +320,13 @@ impl Sky {
             }
             (SkyComposition::TwoTargets, _) => {}
         }
-        self.host = bind_groups(device, "veduta host", self.layouts.get(2..).unwrap_or_default(), &[&bound]).pop();
+        self.host = bind_groups(
+            device,
+            "veduta host",
+            self.layouts.get(2..).unwrap_or_default(),
+            &[&bound],
+        )
+        .pop();
         Ok(())
     }
 

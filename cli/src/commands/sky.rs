@@ -78,7 +78,10 @@ fn exposure_of(rgb: &[f32]) -> f64 {
 /// # Errors
 /// [`CliError`] for arguments out of their domains and files that cannot be written; what the library reports.
 pub fn run(args: &SkyArgs) -> Result<(), CliError> {
-    let exr = args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    let exr = args
+        .out
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
     check_output("--out", &args.out, if exr { "exr" } else { "png" })?;
     check_folder(&args.out)?;
     let within = |name: &str, value: f64, low: f64, high: f64| {
@@ -176,7 +179,12 @@ pub fn run(args: &SkyArgs) -> Result<(), CliError> {
     let (w, h) = (width as usize, height as usize);
     let count = pictures.len();
     if exr {
-        return write_exr(&args.out, width * count as u32, height, &beside(&pictures, w, h));
+        return write_exr(
+            &args.out,
+            width * count as u32,
+            height,
+            &beside(&pictures, w, h),
+        );
     }
     let shown = pictures
         .into_iter()
@@ -185,13 +193,22 @@ pub fn run(args: &SkyArgs) -> Result<(), CliError> {
             Ok(Picture::new(w, h, rgb)?.display(exposure))
         })
         .collect::<Result<Vec<Vec<u8>>, CliError>>()?;
-    write_png(&args.out, width * count as u32, height, &beside(&shown, w, h))
+    write_png(
+        &args.out,
+        width * count as u32,
+        height,
+        &beside(&shown, w, h),
+    )
 }
 
 /// Pictures of one size side by side.
 fn beside<T: Copy>(pictures: &[Vec<T>], width: usize, height: usize) -> Vec<T> {
     (0..height)
-        .flat_map(|y| pictures.iter().map(move |p| &p[3 * width * y..3 * width * (y + 1)]))
+        .flat_map(|y| {
+            pictures
+                .iter()
+                .map(move |p| &p[3 * width * y..3 * width * (y + 1)])
+        })
         .flatten()
         .copied()
         .collect()
