@@ -725,8 +725,14 @@ fn table_scale(atmosphere: &Atmosphere, altitude: f64, sun_mu: f64) -> f32 {
             (radius / (radius + altitude.max(1.0))).acos() + (radius / (radius + top)).acos();
         let angle = reach * f64::from(step) / 8.0;
         let there_mu = sun_mu * angle.cos() + sun_sine * angle.sin();
+        // Below this the ground hides what lies there.
+        let beyond = (angle.abs() - (radius / (radius + altitude.max(1.0))).acos()).max(0.0);
+        let hidden = radius * (1.0 / beyond.cos() - 1.0);
         for level in 0..12 {
             let h = top * (f64::from(level) / 12.0).powi(2);
+            if h < hidden {
+                continue;
+            }
             let horizon = -(h * (2.0 * radius + h)).sqrt() / (radius + h);
             if there_mu < horizon {
                 continue;

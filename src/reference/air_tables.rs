@@ -3,8 +3,10 @@
 use super::air_ray;
 use super::math::{dot, mix, one_minus_exp_over_x, scale};
 use super::medium::{air_phases, air_scattering, peak_phase};
+use super::parallel::parallel_map;
 use super::planet::top_distance;
-use super::sky::Sky;
+use super::sky::{Sky, SkyRay};
+use super::sky_paths::{Paths, trace_sky};
 use crate::atmosphere::{Atmosphere, Lane, MOST_LANES, Profile};
 use std::f64::consts::PI;
 
@@ -231,6 +233,70 @@ pub fn further_orders(before: Moments, last: Moments) -> Moments {
     }
 }
 
+/// Moments of the light of all orders around a place, and the standard error of its integral, by paths in so many directions
+/// drawn evenly.
+pub fn diffuse_moments(
+    sky: &Sky,
+    h: f64,
+    sun_mu: f64,
+    directions: usize,
+    seed: u64,
+) -> (Moments, [f64; 3]) {
+    let sun_sine = (1.0 - sun_mu * sun_mu).max(1e-3).sqrt();
+    let paths = Paths {
+        samples: 2,
+        seed,
+        ..Default::default()
+    };
+    let rays = parallel_map(directions, |i| {
+        // Points of a sequence that fills the square.
+        let [u, v] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3]
+            .map(|step: f64| (0.5 + step * (i + 1) as f64).fract());
+        let (mu, phi) = (1.0 - 2.0 * u, 2.0 * PI * v);
+        let sine = (1.0 - mu * mu).sqrt();
+        let ray = SkyRay {
+            eye_altitude: h,
+            dir: [sine * phi.cos(), mu, sine * phi.sin()],
+            to_sun: [(1.0 - sun_mu * sun_mu).max(0.0).sqrt(), sun_mu, 0.0],
+            distance: f64::INFINITY,
+        };
+        (mu, sine, phi, trace_sky(sky, &ray, &paths, i as u64).mean)
+    });
+    let mut moments = Moments {
+        whole: [0.0; 3],
+        up: [0.0; 3],
+        level: [0.0; 3],
+        aside: [0.0; 3],
+    };
+    let mut squares = [0.0; 3];
+    let part = 4.0 * PI / directions as f64;
+    for (mu, sine, phi, light) in rays {
+        let x = sine * phi.cos() / sun_sine;
+        let across = sine * sine * (2.0 * phi).cos() / (sun_sine * sun_sine);
+        for c in 0..3 {
+            let weighted = part * light[c];
+            squares[c] += weighted * weighted;
+            moments.whole[c] += weighted;
+            moments.up[c] += weighted * mu;
+            moments.level[c] += weighted * 0.5 * (3.0 * mu * mu - 1.0);
+            for (sum, weight) in moments.aside.iter_mut().zip([x, mu * x, across]) {
+                *sum += weighted * weight;
+            }
+        }
+    }
+    let all: f64 = moments.whole.iter().sum();
+    let error = std::array::from_fn(|c| {
+        let mean = moments.whole[c];
+        moments.up[c] /= mean;
+        moments.level[c] /= mean;
+        (squares[c] - mean * mean / directions as f64)
+            .max(0.0)
+            .sqrt()
+    });
+    moments.aside = moments.aside.map(|sum| sum / all);
+    (moments, error)
+}
+
 /// The phase functions of a ray, split into those of smooth and peaked layers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SplitPhases {
@@ -365,7 +431,10 @@ fn bend_terminator(mu: f64) -> f64 {
 fn seen_suns(eye: &SkyEye, zenith: f64, lowest: f64) -> [f64; 2] {
     let r = eye.ground_radius + eye.altitude;
     let (sine, cosine) = zenith.sin_cos();
-    let t = -r * cosine - (-lowest * (2.0 * eye.ground_radius + lowest)).max(0.0).sqrt();
+    let t = -r * cosine
+        - (-lowest * (2.0 * eye.ground_radius + lowest))
+            .max(0.0)
+            .sqrt();
     let angle = (t * sine).atan2(r + t * cosine);
     let flat = eye.to_sun[0].hypot(eye.to_sun[2]);
     [flat * angle.sin(), eye.to_sun[1] * angle.cos()]
@@ -399,7 +468,11 @@ pub fn sky_place_outside(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
         y: y.clamp(0.0, 4.0).sqrt(),
         below,
         nu: dot(dir, eye.to_sun),
-        reach: if y > 1.0 { 0.0 } else { reach(&eye, dir, below) },
+        reach: if y > 1.0 {
+            0.0
+        } else {
+            reach(&eye, dir, below)
+        },
     }
 }
 

@@ -1,11 +1,12 @@
 //! The tables of air and sky: their mappings, what they hold against quadrature and paths in f64, and what is made anew when
 //! (row A07: that of Afra's checklist).
 
-use crate::common::{Random, gpu};
+use crate::common::{Random, evaluator, gpu};
 use veduta::atmosphere::{
     AirRay, Eye, FastProbe, Orders, ProbeLight, ProbeRay, SkyQuality, SkyTables,
 };
 use veduta::reference::probe::{Effort, Probed, probe};
+use veduta::reference::sky::Sky;
 use veduta::reference::{air_tables, medium};
 use veduta::{Atmosphere, Preset, Settings};
 
@@ -16,33 +17,12 @@ fn named(name: &str) -> Atmosphere {
 }
 
 fn quality(preset: Preset) -> SkyQuality {
-    let mut q = SkyQuality::of(&Settings::resolve(veduta::programs(), &preset, None, &[]).unwrap());
-    for (k, v) in std::env::vars() {
-        let n: Vec<u32> = v.split(',').filter_map(|p| p.parse().ok()).collect();
-        match k.as_str() {
-            "Q_SKY" => q.sky = [n[0], n[1]], "Q_AERIAL" => q.aerial = [n[0], n[1]], "Q_SLICES" => q.aerial_slices = n[0],
-            "Q_COLUMNS" => q.columns = [n[0], n[1]], "Q_STEPS" => q.sky_steps = n[0], "Q_ASTEPS" => q.aerial_steps = n[0], "Q_DIFFUSE" => q.diffuse = [n[0], n[1]], _ => {}
-        }
-    }
-    q
-}
-
-fn set() -> &'static veduta::ProgramSet {
-    static SET: std::sync::OnceLock<veduta::ProgramSet> = std::sync::OnceLock::new();
-    if std::env::var("LIVE").is_err() { return veduta::programs(); }
-    SET.get_or_init(|| {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-        let source = veduta::compose::Source::read(&[&folder.join("wgsl"), &folder.join("presets")]).unwrap();
-        let mut set = veduta::programs().clone();
-        set.programs.to_mut().retain(|p| !(p.program.starts_with("sky") || p.program.starts_with("air")));
-        for p in ["air_columns", "air_diffuse", "sky_view", "sky_aerial", "sky_probe"] { set.get_or_compose(&source, p, &[]).unwrap(); }
-        set
-    })
+    SkyQuality::of(&Settings::resolve(veduta::programs(), &preset, None, &[]).unwrap())
 }
 
 fn fast(air: &Atmosphere, quality: &SkyQuality, rays: &[ProbeRay]) -> Vec<ProbeLight> {
     let gpu = gpu();
-    FastProbe::new(&gpu.device, set(), air, quality, 0)
+    FastProbe::new(&gpu.device, veduta::programs(), air, quality, 0)
         .and_then(|mut p| p.run(&gpu.device, &gpu.queue, rays))
         .unwrap()
 }
@@ -98,34 +78,30 @@ fn rays_of_eyes(air: &Atmosphere, eyes: usize, each: usize, seed: u64) -> Vec<Pr
     rays
 }
 
-/// Errors of all channels over the truth or a floor, less `spread` standard errors of the truth, with their rays; the
-/// smallest first.
+/// Errors of all channels over the truth or a floor, with their rays; the smallest first.
 fn errors(
     found: &[ProbeLight],
     truth: &[Probed],
     floor: f64,
-    spread: f64,
-    part: fn(&ProbeLight, &Probed, usize) -> (f64, f64, f64),
+    part: fn(&ProbeLight, &Probed, usize) -> (f64, f64),
 ) -> Vec<(f64, usize)> {
     let mut all: Vec<(f64, usize)> = (0..3 * found.len())
         .map(|k| {
-            let (f, t, error) = part(&found[k / 3], &truth[k / 3], k % 3);
+            let (f, t) = part(&found[k / 3], &truth[k / 3], k % 3);
             assert!(f.is_finite(), "ray {}", k / 3);
-            let off = ((f - t).abs() - spread * error).max(0.0);
-            (off / t.abs().max(floor), k / 3)
+            ((f - t).abs() / t.abs().max(floor), k / 3)
         })
         .collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     all
 }
 
-fn light(found: &ProbeLight, truth: &Probed, c: usize) -> (f64, f64, f64) {
-    let found = f64::from(found.in_scatter[c]);
-    (found, truth.in_scatter[c], truth.error[c])
+fn light(found: &ProbeLight, truth: &Probed, c: usize) -> (f64, f64) {
+    (f64::from(found.in_scatter[c]), truth.in_scatter[c])
 }
 
-fn left(found: &ProbeLight, truth: &Probed, c: usize) -> (f64, f64, f64) {
-    (f64::from(found.transmittance[c]), truth.transmittance[c], 0.0)
+fn left(found: &ProbeLight, truth: &Probed, c: usize) -> (f64, f64) {
+    (f64::from(found.transmittance[c]), truth.transmittance[c])
 }
 
 fn centile(all: &[(f64, usize)], share: f64) -> f64 {
@@ -140,58 +116,51 @@ fn shown(all: &[(f64, usize)]) -> String {
 
 /// A ray in words.
 fn told(air: &Atmosphere, ray: &ProbeRay) -> String {
-    let elevation = ray.dir[1].atan2(ray.dir[0].hypot(ray.dir[2])).to_degrees();
-    let r = air.planet_radius + ray.altitude;
-    let tangent = r * ray.dir[0].hypot(ray.dir[2]) - air.planet_radius;
-    let azimuth = ray.dir[2].atan2(ray.dir[0]).to_degrees();
-    let made = AirRay::new(air.planet_radius, air.thickness, ray);
+    let flat = ray.dir[0].hypot(ray.dir[2]);
+    let lowest = (air.planet_radius + ray.altitude) * flat - air.planet_radius;
     format!(
-        "h {:.4e} elevation {elevation:.4} (horizon {:.4}, lowest {tangent:.0} m) azimuth {azimuth:.1} sun {:.3} distance {:.2e} sun at entry {:.3} length {:.3e} dark {:.3e} {:.3e} nu {:.4}",
+        "{:.3e} m up, elevation {:.4}, lowest {lowest:.0} m, azimuth {:.1}, sun {:.2} degrees",
         ray.altitude,
-        touching(air, ray.altitude, 0.0).to_degrees(),
+        ray.dir[1].atan2(flat).to_degrees(),
+        ray.dir[2].atan2(ray.dir[0]).to_degrees(),
         ray.to_sun[1].asin().to_degrees(),
-        ray.distance,
-        f64::from(made.sun_mu).asin().to_degrees(),
-        made.length, made.dark_from, made.dark_to, made.nu
     )
 }
 
+/// The presets with how much larger their errors may be.
+fn presets() -> [(Preset, f64); 3] {
+    [
+        (Preset::High, 1.0),
+        (Preset::Medium, 2.0),
+        (Preset::Low, 4.0),
+    ]
+}
+
+/// The light of `sky_radiance`, baked by `scatter_along` out of `air_source`.
 #[test]
 fn single_scattering_from_tables_meets_quadrature() {
-    let eyes = std::env::var("EYES").map_or(40, |v| v.parse().unwrap());
-    let show = std::env::var("SHOW").map_or(0, |v| v.parse().unwrap());
-    let presets = if std::env::var("HIGH").is_ok() { vec![Preset::High] } else { vec![Preset::High, Preset::Medium, Preset::Low] };
     for (name, seed) in [("earth", 1), ("thesis", 2), ("hazy", 3)] {
         let air = named(name);
-        let rays = rays_of_eyes(&air, eyes, 40, seed);
-        let start = std::time::Instant::now();
+        let rays = rays_of_eyes(&air, 40, 40, seed);
         let truth = truth(&air, &rays, Orders::Single, 0);
-        println!("truth {:.1} s", start.elapsed().as_secs_f64());
-        for preset in presets.clone() {
+        for (preset, share) in presets() {
             let quality = SkyQuality {
                 all_orders: false,
                 ..quality(preset.clone())
             };
-            let start = std::time::Instant::now();
             let found = fast(&air, &quality, &rays);
-            println!("fast {:.1} s", start.elapsed().as_secs_f64());
-            let light = errors(&found, &truth, 1e-6, 0.0, light);
-            let left = errors(&found, &truth, 1e-6, 0.0, left);
-            println!("{name} {preset:?}: in-scatter {}, transmittance {}", shown(&light), shown(&left));
-            for class in ["inside above", "inside below", "outside limb", "outside globe"] {
-                let of = |k: usize| {
-                    let ray = &rays[k];
-                    let below = ray.dir[1].atan2(ray.dir[0].hypot(ray.dir[2])) < touching(&air, ray.altitude, 0.0);
-                    match (ray.altitude > air.thickness, below) { (false, false) => "inside above", (false, true) => "inside below", (true, false) => "outside limb", _ => "outside globe" }
-                };
-                let part: Vec<_> = light.iter().copied().filter(|(_, k)| of(*k) == class).collect();
-                let depth: Vec<_> = left.iter().copied().filter(|(_, k)| of(*k) == class).collect();
-                println!("    {class}: {} ; {}", shown(&part), shown(&depth));
-            }
-            let one = std::env::var("CLASS").unwrap_or_default();
-            for (off, k) in light.iter().rev().filter(|(_, k)| one.is_empty() || (rays[*k].altitude > air.thickness) == (one == "out")).take(show) {
-                println!("   {:.1} % {:?} {:.2e} {:.2e}", 100.0 * off, told(&air, &rays[*k]), found[*k].in_scatter[1], truth[*k].in_scatter[1]);
-            }
+            let light = errors(&found, &truth, 1e-6, light);
+            let left = errors(&found, &truth, 1e-6, left);
+            println!(
+                "{name} {preset:?}: in-scatter {}, transmittance {}",
+                shown(&light),
+                shown(&left)
+            );
+            let (worst, at) = light[light.len() - 1];
+            println!("    {:.1} % at {}", 100.0 * worst, told(&air, &rays[at]));
+            assert!(centile(&light, 0.5) <= 0.005 * share);
+            assert!(centile(&light, 0.99) <= 0.03 * share);
+            assert!(centile(&left, 0.95) <= 0.02 * share);
         }
     }
 }
@@ -215,7 +184,7 @@ fn prepare(tables: &mut SkyTables, eye: &Eye) -> veduta::Work {
 }
 
 fn tables_of(air: &Atmosphere, quality: &SkyQuality) -> SkyTables {
-    SkyTables::new(&gpu().device, set(), air, quality).unwrap()
+    SkyTables::new(&gpu().device, veduta::programs(), air, quality).unwrap()
 }
 
 const NOON: Eye = Eye {
@@ -283,14 +252,14 @@ fn row_a07_the_table_of_columns_is_right_at_every_height_and_angle() {
         for (k, ray) in rays.iter().enumerate() {
             let found = medium::air_extinction(&air, by_hand(ray.altitude, ray.dir[1]));
             for c in 0..3 {
-                off.push(((found[c] / truth[k][c].max(1e-6) - truth[k][c] / truth[k][c].max(1e-6)).abs(), k));
+                off.push(((found[c] - truth[k][c]).abs() / truth[k][c].max(1e-2), k));
             }
         }
         off.sort_by(|a, b| a.0.total_cmp(&b.0));
-        println!("{name}: columns {} by hand", shown(&off));
-        for (e, k) in off.iter().rev().take(12).step_by(3) {
-            println!("   {:.2} % {}", 100.0 * e, told(&air, &rays[*k]));
-        }
+        println!("{name}: optical depth to the sun {}", shown(&off));
+        let (worst, at) = off[off.len() - 1];
+        println!("    {:.1} % at {}", 100.0 * worst, told(&air, &rays[at]));
+        assert!(centile(&off, 0.95) <= 0.005);
         // The same table as the device filters it, of up to a hundred eyes.
         let some: Vec<ProbeRay> = rays.iter().step_by(40).copied().collect();
         let filtered = fast(&air, &quality, &some);
@@ -306,7 +275,7 @@ fn row_a07_the_table_of_columns_is_right_at_every_height_and_angle() {
     }
 }
 
-/// Distances from 0.1 to 100 km from eyes in the lower air and above.
+/// `aerial_light` and `aerial_depth` over 0.1 to 100 km, from eyes in the lower air and above.
 #[test]
 fn air_before_things_meets_quadrature() {
     for (name, seed) in [("earth", 4), ("hazy", 5)] {
@@ -332,19 +301,21 @@ fn air_before_things_meets_quadrature() {
             }
         }
         let truth = truth(&air, &rays, Orders::Single, 0);
-        for preset in [Preset::High, Preset::Medium, Preset::Low] {
-            let quality = SkyQuality { all_orders: false, ..quality(preset.clone()) };
+        for (preset, share) in presets() {
+            let quality = SkyQuality {
+                all_orders: false,
+                ..quality(preset.clone())
+            };
             let found = fast(&air, &quality, &rays);
-            let light = errors(&found, &truth, 1e-6, 0.0, light);
-            let left = errors(&found, &truth, 1e-6, 0.0, left);
-            println!("{name} {preset:?}: in-scatter {}, transmittance {}", shown(&light), shown(&left));
-            if preset == Preset::High && std::env::var("SHOW").is_ok() {
-                for list in [&light, &left] {
-                    for (off, k) in list.iter().rev().skip(list.len() / 40).take(12) {
-                        println!("   {:.1} % {:?}", 100.0 * off, told(&air, &rays[*k]));
-                    }
-                }
-            }
+            let light = errors(&found, &truth, 1e-6, light);
+            let left = errors(&found, &truth, 1e-6, left);
+            println!(
+                "{name} {preset:?}: in-scatter {}, transmittance {}",
+                shown(&light),
+                shown(&left)
+            );
+            assert!(centile(&light, 0.95) <= 0.01 * share);
+            assert!(centile(&left, 0.95) <= 0.005 * share);
         }
     }
 }
@@ -374,30 +345,78 @@ fn ground_rays(zeniths: &[f64], each: usize, seed: u64) -> Vec<ProbeRay> {
 
 #[test]
 fn all_orders_from_tables_meet_paths() {
-    let samples = std::env::var("SAMPLES").map_or(3000, |v| v.parse().unwrap());
-    let each = std::env::var("EACH").map_or(6, |v| v.parse().unwrap());
+    let high = [0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 75.0, 80.0];
     for albedo in [0.0, 0.3] {
-        let air = Atmosphere { ground_albedo: [albedo; 3], ..named("earth") };
-        for (zeniths, bar) in [
-            (&[0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0][..], 0.04),
-            (&[88.0, 90.0], 0.08),
-            (&[93.0], 0.12),
+        let air = Atmosphere {
+            ground_albedo: [albedo; 3],
+            ..named("earth")
+        };
+        for (zeniths, bar, samples) in [
+            (&high[..], 0.04, 3000),
+            (&[88.0, 90.0], 0.08, 8000),
+            (&[93.0], 0.12, 40_000),
         ] {
-            let rays = ground_rays(zeniths, each, 8);
-            let start = std::time::Instant::now();
+            let rays = ground_rays(zeniths, 6, 8);
             let truth = truth(&air, &rays, Orders::All, samples);
-            let own: Vec<f64> = truth.iter().map(|t| t.error[1] / t.in_scatter[1]).collect();
-            println!("{:.1} s, mean standard error {:.2} %", start.elapsed().as_secs_f64(), 100.0 * own.iter().sum::<f64>() / own.len() as f64);
-            for preset in [Preset::High, Preset::Medium, Preset::Low] {
-                let found = fast(&air, &quality(preset.clone()), &rays);
-                let all = errors(&found, &truth, 1e-6, 0.0, light);
-                println!("albedo {albedo} sun {zeniths:?} {preset:?}: {} (bar {bar})", shown(&all));
-                let mut signed = [0.0; 3];
-                for (f, t) in found.iter().zip(&truth) {
-                    for c in 0..3 { signed[c] += 100.0 * (f64::from(f.in_scatter[c]) / t.in_scatter[c] - 1.0) / found.len() as f64; }
-                }
-                println!("     mean {signed:.2?} %");
+            // The paths' own error is no error of the tables: both add up as squares.
+            let own: f64 = truth
+                .iter()
+                .flat_map(|t| (0..3).map(|c| (t.error[c] / t.in_scatter[c].max(1e-6)).powi(2)))
+                .sum();
+            let own = (own / (3 * truth.len()) as f64).sqrt();
+            for (preset, share) in presets() {
+                let all = errors(
+                    &fast(&air, &quality(preset.clone()), &rays),
+                    &truth,
+                    1e-6,
+                    light,
+                );
+                println!(
+                    "albedo {albedo}, sun {zeniths:?} {preset:?}: {}, the paths' own {:.2} %",
+                    shown(&all),
+                    100.0 * own
+                );
+                assert!(centile(&all, 0.95) <= (bar * share).hypot(2.0 * own));
+                assert!(bar > 0.04 || centile(&all, 0.5) <= (0.012 * share).hypot(own));
             }
+        }
+    }
+}
+
+/// `order_moments`, added up, as `diffuse_moments` reads them.
+#[test]
+fn moments_of_diffuse_light_meet_paths() {
+    let air = named("earth");
+    let sky = Sky::new(&air).unwrap();
+    let quality = quality(Preset::High);
+    let mut tables = tables_of(&air, &quality);
+    let _ = prepare(&mut tables, &NOON);
+    let data = gpu().read_texture(tables.diffuse().texture()).unwrap();
+    let size = quality.diffuse.map(|n| n as usize);
+    for (x, y) in [
+        (size[0] - 1, 0),
+        (size[0] - 5, 2),
+        (size[0] / 2, 1),
+        (size[0] - 9, 5),
+    ] {
+        let coordinates = [
+            x as f64 / (size[0] - 1) as f64,
+            y as f64 / (size[1] - 1) as f64,
+        ];
+        let [h, sun_mu] = air_tables::diffuse_place(air.thickness, coordinates);
+        let at = 8 * (y * size[0] + x);
+        let first = [0, 2, 4, 6].map(|k| f16([data[at + k], data[at + k + 1]]));
+        let found = air_tables::decode_moments(first, [0.0; 4], [0.0; 4]);
+        let (truth, error) = air_tables::diffuse_moments(&sky, h, sun_mu, 6000, 3);
+        for c in 0..3 {
+            let off = found.whole[c] / truth.whole[c] - 1.0;
+            let own = error[c] / truth.whole[c];
+            println!(
+                "{h:.0} m, sun {sun_mu:.3}: {:.2} % +- {:.2} %",
+                100.0 * off,
+                100.0 * own
+            );
+            assert!(off.abs() <= 0.03_f64.hypot(3.0 * own));
         }
     }
 }
@@ -420,20 +439,33 @@ fn twilight_falls_with_every_tenth_of_a_degree() {
     for which in 0..2 {
         for i in 1..=120 {
             for c in 0..3 {
-                let (before, after) = (found[2 * i - 2 + which].in_scatter[c], found[2 * i + which].in_scatter[c]);
-                assert!(after < before && after > 0.0, "{which} {i} {c}: {before:e} {after:e}");
+                let (before, after) = (
+                    found[2 * i - 2 + which].in_scatter[c],
+                    found[2 * i + which].in_scatter[c],
+                );
+                assert!(
+                    after < before && after > 0.0,
+                    "{which} {i} {c}: {before:e} {after:e}"
+                );
             }
         }
     }
-    let samples = std::env::var("SAMPLES").map_or(20_000, |v| v.parse().unwrap());
-    for i in [0, 20, 40, 60, 120] {
+    // Paths become rare: what they say counts where they know it to 15 %.
+    for (i, samples) in [(0, 20_000), (20, 40_000)] {
         let some = [rays[2 * i], rays[2 * i + 1]];
-        let start = std::time::Instant::now();
-        let truth = truth(&air, &some, Orders::All, samples);
-        for (k, t) in truth.iter().enumerate() {
-            println!("sun {:.1} {}: {:?} of {:.3?}, +- {:.1?} % ({:.1} s)", -6.0 - 0.1 * i as f64, ["zenith", "horizon"][k],
-                [0, 1, 2].map(|c| (100.0 * (f64::from(found[2 * i + k].in_scatter[c]) / t.in_scatter[c] - 1.0)).round()), t.in_scatter.map(|l| 1e9 * l),
-                [0, 1, 2].map(|c| 100.0 * t.error[c] / t.in_scatter[c]), start.elapsed().as_secs_f64());
+        for (k, t) in truth(&air, &some, Orders::All, samples).iter().enumerate() {
+            for c in 0..3 {
+                let own = t.error[c] / t.in_scatter[c];
+                let off = f64::from(found[2 * i + k].in_scatter[c]) / t.in_scatter[c] - 1.0;
+                println!(
+                    "sun {:.0} {} {c}: {:.0} % +- {:.0} %",
+                    -6.0 - 0.1 * i as f64,
+                    ["zenith", "horizon"][k],
+                    100.0 * off,
+                    100.0 * own
+                );
+                assert!(own > 0.15 || off.abs() <= 0.3_f64.max(2.0 * own));
+            }
         }
     }
 }
@@ -443,11 +475,20 @@ fn no_eye_is_too_low_or_too_high_for_the_tables() {
     let air = named("earth");
     let top = air.thickness;
     let one = |x: f32| f64::from(x);
-    let heights = [0.0, 1.7, one((top as f32).next_down()), top, one((top as f32).next_up()), 1e8];
+    let heights = [
+        0.0,
+        1.7,
+        one((top as f32).next_down()),
+        top,
+        one((top as f32).next_up()),
+        1e8,
+    ];
     let mut rays = Vec::new();
     for altitude in heights {
-        for sun in [-90.0, -18.0, -6.0, -1e-6, 0.0, 30.0, 90.0_f64] {
-            for elevation in [-90.0, -89.999, -86.4, -45.0, -10.0, -1e-3, -1e-9, 0.0, 1e-9, 1e-3, 45.0, 90.0_f64] {
+        for sun in [-90.0, -18.0, -6.0, -1e-6, 30.0, 90.0_f64] {
+            for elevation in [
+                -90.0, -89.999, -86.4, -45.0, -10.0, -1e-3, -1e-9, 0.0, 1e-9, 1e-3, 45.0, 90.0_f64,
+            ] {
                 for azimuth in [0.0, 90.0, 180.0_f64] {
                     for distance in [1.0, 1e5, FAR] {
                         rays.push(ProbeRay {
@@ -462,15 +503,26 @@ fn no_eye_is_too_low_or_too_high_for_the_tables() {
         }
     }
     for all_orders in [false, true] {
-        let quality = SkyQuality { all_orders, ..quality(Preset::Low) };
+        let quality = SkyQuality {
+            all_orders,
+            ..quality(Preset::Low)
+        };
         for (found, ray) in fast(&air, &quality, &rays).iter().zip(&rays) {
             let fine = found.in_scatter.iter().all(|v| v.is_finite() && *v >= 0.0)
                 && found.transmittance.iter().all(|v| (0.0..=1.0).contains(v));
             assert!(fine, "{ray:?}: {found:?}");
             let made = AirRay::new(air.planet_radius, top, ray);
-            let tangent = (air.planet_radius + ray.altitude) * ray.dir[0].hypot(ray.dir[2]) - air.planet_radius;
-            if ray.altitude > top && (made.length == 0.0 && (tangent - top).abs() > 10.0 || ray.distance < ray.altitude - top) {
-                assert_eq!((found.in_scatter, found.transmittance), ([0.0; 3], [1.0; 3]), "{ray:?}");
+            let tangent = (air.planet_radius + ray.altitude) * ray.dir[0].hypot(ray.dir[2])
+                - air.planet_radius;
+            if ray.altitude > top
+                && (made.length == 0.0 && (tangent - top).abs() > 10.0
+                    || ray.distance < ray.altitude - top)
+            {
+                assert_eq!(
+                    (found.in_scatter, found.transmittance),
+                    ([0.0; 3], [1.0; 3]),
+                    "{ray:?}"
+                );
             }
         }
     }
@@ -479,37 +531,257 @@ fn no_eye_is_too_low_or_too_high_for_the_tables() {
 #[test]
 fn only_what_has_changed_is_made_anew() {
     let earth = named("earth");
-    let quality = SkyQuality::of(&Settings::resolve(veduta::programs(), &Preset::Low, None, &[]).unwrap());
+    let quality =
+        SkyQuality::of(&Settings::resolve(veduta::programs(), &Preset::Low, None, &[]).unwrap());
     let mut tables = tables_of(&earth, &quality);
     // Columns, three orders, sky, air before things.
     let first = prepare(&mut tables, &NOON);
     assert_eq!((first.bakes, first.writes), (6, 2));
     assert_eq!(prepare(&mut tables, &NOON), veduta::Work::default());
-    let turned = Eye { to_sun: [0.0, 0.8, -0.6], ..NOON };
+    let turned = Eye {
+        to_sun: [0.0, 0.8, -0.6],
+        ..NOON
+    };
     let work = prepare(&mut tables, &turned);
     assert_eq!((work.bakes, work.writes), (0, 1));
     // An eye has no place but its altitude.
     assert_eq!(prepare(&mut tables, &turned), veduta::Work::default());
-    let sunk = Eye { to_sun: [0.8, 0.6, 0.0], ..NOON };
+    let sunk = Eye {
+        to_sun: [0.8, 0.6, 0.0],
+        ..NOON
+    };
     assert_eq!(prepare(&mut tables, &sunk).bakes, 2);
-    let risen = Eye { altitude: 3.0, ..sunk };
+    let risen = Eye {
+        altitude: 3.0,
+        ..sunk
+    };
     assert_eq!(prepare(&mut tables, &risen).bakes, 2);
-    let larger = Eye { sun_angular_radius: 0.01, ..risen };
+    let larger = Eye {
+        sun_angular_radius: 0.01,
+        ..risen
+    };
     assert_eq!(prepare(&mut tables, &larger).bakes, 2);
     // All but the columns.
-    let mut air = Atmosphere { ground_albedo: [0.1; 3], ..earth.clone() };
+    let mut air = Atmosphere {
+        ground_albedo: [0.1; 3],
+        ..earth.clone()
+    };
     tables.set_atmosphere(&air).unwrap();
     assert_eq!(prepare(&mut tables, &larger).bakes, 5);
     air.layers[0].scattering[1] *= 2.0;
     air.layers[2].absorption[0] *= 2.0;
     tables.set_atmosphere(&air).unwrap();
     assert_eq!(prepare(&mut tables, &larger).bakes, 5);
-    air.layers[1].profile = veduta::atmosphere::Profile::Exponential { scale_height: 1300.0 };
+    air.layers[1].profile = veduta::atmosphere::Profile::Exponential {
+        scale_height: 1300.0,
+    };
     tables.set_atmosphere(&air).unwrap();
     assert_eq!(prepare(&mut tables, &larger).bakes, 6);
     tables.set_atmosphere(&air).unwrap();
     assert_eq!(prepare(&mut tables, &larger), veduta::Work::default());
     // Without light of higher orders its table is never made.
-    let single = SkyQuality { all_orders: false, ..quality };
+    let single = SkyQuality {
+        all_orders: false,
+        ..quality
+    };
     assert_eq!(prepare(&mut tables_of(&earth, &single), &NOON).bakes, 3);
+}
+
+fn bits(rows: &[Vec<f32>]) -> Vec<u32> {
+    rows.iter().flatten().map(|x| x.to_bits()).collect()
+}
+
+/// Numbers of [0, 1] with both ends.
+fn shares(count: usize, columns: usize, seed: u64) -> Vec<Vec<f32>> {
+    let random = &mut Random(seed);
+    (0..count)
+        .map(|i| {
+            (0..columns)
+                .map(|k| match (i + 3 * k) % 16 {
+                    0 => 0.0,
+                    1 => 1.0,
+                    _ => random.unit(),
+                })
+                .collect()
+        })
+        .collect()
+}
+
+#[test]
+fn coordinates_of_columns_and_diffuse_light_come_back() {
+    let rows = shares(4000, 2, 1);
+    for (imports, prelude, expression, bars) in [
+        (
+            "veduta::atmosphere::columns::{column_coordinates, column_place}",
+            "fn there(p: vec2f) -> vec2f { let at = column_place(6360000.0, 100000.0, p); return column_coordinates(6360000.0, 100000.0, at.x, at.y); }",
+            "there(vec2f(in.f[0], in.f[1]))",
+            [4e-4, 1e-6],
+        ),
+        (
+            "veduta::atmosphere::diffuse::{diffuse_coordinates, diffuse_place}",
+            "fn there(p: vec2f) -> vec2f { let at = diffuse_place(100000.0, p); return diffuse_coordinates(100000.0, at.x, at.y); }",
+            "there(vec2f(in.f[0], in.f[1]))",
+            [1e-6, 1e-6],
+        ),
+    ] {
+        let found = evaluator(&[imports], prelude, expression, 2)
+            .run(&bits(&rows))
+            .unwrap();
+        let mut worst = [0.0_f64; 2];
+        for (found, row) in found.chunks(2).zip(&rows) {
+            for k in 0..2 {
+                worst[k] = worst[k].max((found[k] - f64::from(row[k])).abs());
+            }
+        }
+        println!("{imports}: {:.1e} {:.1e}", worst[0], worst[1]);
+        assert!(worst[0] < bars[0] && worst[1] < bars[1], "{worst:?}");
+    }
+    // The directions themselves, whose error the headers give for the altitude beside them.
+    let places = evaluator(
+        &["veduta::atmosphere::columns::{column_place}", "veduta::atmosphere::diffuse::{diffuse_place}"],
+        "",
+        "vec2f(column_place(6360000.0, 100000.0, vec2f(in.f[0], in.f[1])).y, diffuse_place(100000.0, vec2f(in.f[0], in.f[1])).y)",
+        2,
+    )
+    .run(&bits(&rows))
+    .unwrap();
+    for (found, row) in places.chunks(2).zip(&rows) {
+        let place = [0, 1].map(|k| f64::from(row[k]));
+        let truth = [
+            air_tables::column_place(6.36e6, 1e5, place)[1],
+            air_tables::diffuse_place(1e5, place)[1],
+        ];
+        assert!((found[0] - truth[0]).abs() < 3e-7 && (found[1] - truth[1]).abs() < 2e-6);
+    }
+}
+
+#[test]
+fn moments_come_back() {
+    let random = &mut Random(5);
+    let rows: Vec<Vec<f32>> = (0..4000)
+        .map(|_| {
+            let size = random.between(-30.0, 3.0).exp2();
+            let whole = [0; 3].map(|_| size * random.between(0.01, 1.0));
+            let rest = [0; 9].map(|_| random.between(-1.0, 1.0));
+            whole.into_iter().chain(rest).collect()
+        })
+        .collect();
+    let prelude = "
+fn given(a: vec4f, b: vec4f, c: vec4f) -> Moments { return Moments(a.xyz, vec3f(a.w, b.xy), vec3f(b.zw, c.x), c.yzw); }
+fn back(m: Moments) -> Moments {
+    return decode_moments(encode_moments(m), vec4f(m.up, m.aside.y), vec4f(m.level, m.aside.z));
+}
+fn off(m: Moments) -> vec4f {
+    let n = back(m);
+    let rest = max(abs(n.up - m.up), max(abs(n.level - m.level), abs(n.aside - m.aside)));
+    return vec4f(abs(n.whole - m.whole) / max(m.whole.x, max(m.whole.y, m.whole.z)), max(rest.x, max(rest.y, rest.z)));
+}";
+    let found = evaluator(
+        &["veduta::atmosphere::diffuse::{Moments, encode_moments, decode_moments}"],
+        prelude,
+        "off(given(vec4f(in.f[0], in.f[1], in.f[2], in.f[3]), vec4f(in.f[4], in.f[5], in.f[6], in.f[7]), vec4f(in.f[8], in.f[9], in.f[10], in.f[11])))",
+        12,
+    )
+    .run(&bits(&rows))
+    .unwrap();
+    for off in found.chunks(4) {
+        assert!(
+            off[..3].iter().all(|e| *e < 1e-5) && off[3] == 0.0,
+            "{off:?}"
+        );
+    }
+}
+
+#[test]
+fn directions_of_an_eye_come_back() {
+    let top = 1e5_f32;
+    for altitude in [0.0, 1.7, 1e4, top, top.next_up(), 4e5, 3.6e7, 1e8] {
+        let h = f64::from(altitude);
+        let (radius, r) = (6.36e6, 6.36e6 + h);
+        let horizon = (radius / r) / (1.0 - (h * (2.0 * radius + h)).sqrt() / r);
+        let mut rows = shares(3000, 4, 9);
+        for row in &mut rows {
+            // Sun from the nadir to the zenith.
+            row[2] = 2.0 * row[2] - 1.0;
+            row[3] = row[3].round();
+        }
+        let prelude = format!(
+            "fn eye(mu: f32) -> SkyEye {{ return SkyEye(vec3f(0.0, mu, sqrt(max(1.0 - mu * mu, 0.0))), {altitude:?}f, {:?}f, 6360000.0, 100000.0, 1.0, 0.0, 0u); }}
+fn back(p: vec4f) -> vec4f {{
+    let e = eye(p.z);
+    let at = sky_place(e, sky_direction(e, p.xy, p.w > 0.5));
+    return vec4f(at.x, at.y, select(0.0, 1.0, at.below), at.reach);
+}}
+fn seen(p: vec4f) -> vec3f {{ return sky_direction(eye(p.z), p.xy, p.w > 0.5); }}",
+            horizon as f32
+        );
+        let imports = ["veduta::atmosphere::sky_view::{SkyEye, sky_place, sky_direction}"];
+        let run = |call: &str| {
+            let call = format!("{call}(vec4f(in.f[0], in.f[1], in.f[2], in.f[3]))");
+            evaluator(&imports, &prelude, &call, 4)
+                .run(&bits(&rows))
+                .unwrap()
+        };
+        let (back, seen) = (run("back"), run("seen"));
+        let mut worst = [0.0_f64; 3];
+        let mut flips = 0;
+        for ((found, dir), row) in back.chunks(4).zip(seen.chunks(3)).zip(&rows) {
+            let [x, y, mu, below] = [0, 1, 2, 3].map(|k| f64::from(row[k]));
+            let y = y.max(4e-3);
+            let steep = (1.0 - mu * mu).sqrt() * dir[0].hypot(dir[2]);
+            if found[2] != below {
+                // At the horizon f32 may choose the other side.
+                flips += 1;
+                assert!(y < 0.01, "{altitude} {row:?} {found:?}");
+                continue;
+            }
+            worst[1] = worst[1].max((found[1] - y).abs());
+            // Beyond what a row holds, and without an azimuth, places lie on each other.
+            let ends = h > 1e5 && (x > 0.98 || x < 0.02);
+            if steep > 0.02 && !ends {
+                worst[0] = worst[0].max((found[0] - x).abs());
+            }
+            let ray = ProbeRay {
+                altitude: h,
+                dir: [dir[0], dir[1], dir[2]],
+                to_sun: [0.0, 1.0, 0.0],
+                distance: FAR,
+            };
+            let length = f64::from(AirRay::new(radius, 1e5, &ray).length);
+            if y > 0.05 && y < 0.98 && length > 1.0 {
+                worst[2] = worst[2].max((found[3] * 1e5 / length - 1.0).abs());
+            }
+        }
+        println!(
+            "{altitude:?} m: azimuth {:.1e}, height {:.1e}, reach {:.1e}, {flips} flips",
+            worst[0], worst[1], worst[2]
+        );
+        assert!(
+            worst[0] < 5e-3 && worst[1] < 5e-3 && worst[2] < 0.01,
+            "{altitude}: {worst:?}"
+        );
+    }
+}
+
+#[test]
+fn slices_and_distances_come_back() {
+    let rows: Vec<Vec<f32>> = shares(6000, 2, 4)
+        .into_iter()
+        .enumerate()
+        .map(|(i, row)| vec![row[0], (2e6_f32.ln() * row[1]).exp(), (i % 3) as f32])
+        .collect();
+    let found = evaluator(
+        &["veduta::atmosphere::aerial::{aerial_slice, aerial_distance}"],
+        "fn back(slice: f32, length: f32, spacing: i32) -> f32 { return aerial_slice(spacing, aerial_distance(spacing, slice, length), length); }",
+        "back(in.f[0], in.f[1], i32(in.f[2]))",
+        3,
+    )
+    .run(&bits(&rows))
+    .unwrap();
+    let mut worst = 0.0_f64;
+    for (found, row) in found.iter().zip(&rows) {
+        worst = worst.max((found - f64::from(row[0])).abs());
+    }
+    println!("slices: {worst:.1e}");
+    assert!(worst < 4e-4);
 }

@@ -1683,7 +1683,10 @@ fn particular(entry: Entry) -> Entry {
                 .lin("eye.top", 5e4, 1e5)
                 .unit("dir")
                 .judged(&["x", "y", "below", "nu"])
-                .jumps("directions along the horizon, and those without an azimuth", 1e-6);
+                .jumps(
+                    "directions along the horizon, and those without an azimuth",
+                    1e-6,
+                );
             match name {
                 "sky_place_inside" => entry.lin("eye.altitude", 0.0, 5e4),
                 "sky_place_outside" => entry.log("eye.altitude", 1.1e5, 1e8),
