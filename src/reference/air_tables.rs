@@ -412,7 +412,11 @@ pub fn sky_place_inside(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
         y: (1.0 - ratio.min(1.0 / ratio)).max(0.0).sqrt(),
         below: ratio > 1.0,
         nu: dot(dir, eye.to_sun),
-        reach: reach(&eye, dir, ratio > 1.0),
+        reach: if eye.shows_ground != 0 {
+            1.0
+        } else {
+            reach(&eye, dir, ratio > 1.0)
+        },
     }
 }
 

@@ -51,7 +51,8 @@ struct SkyPlace {
     below: bool,
     /// Cosine of the angle to the sun.
     nu: f32,
-    /// Length of the ray in the air over the air's thickness, which the table of the sky is divided by; 1 where that shows the ground.
+    /// Length of the ray in the air over the air's thickness, which the table of the sky is divided by; 1 where that shows the ground, and everywhere for an eye within the air whose
+    /// table does.
     reach: f32,
 }
 
@@ -85,6 +86,20 @@ fn sun_ends(suns: vec2<f32>) -> vec2<f32> {
     return vec2<f32>(bend_terminator(first), bend_terminator(max(suns.y - suns.x, min(first - 1e-3, DARKEST_SUN))));
 }
 
+/// Place of a unit vector `dir` in the tables of an eye within the air that show the ground: the reach is 1.
+///
+/// internal
+fn sky_place_shown(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
+    // Tangent of half the zenith angle over that of the horizon, or the same from the nadir.
+    let aside = dot(dir.xz, dir.xz);
+    let over = inverseSqrt(max(aside, 1e-20));
+    let ratio = max(aside, 1e-20) * over / max((1.0 + dir.y) * eye.horizon, 1e-20);
+    let flat = inverseSqrt(max(dot(eye.to_sun.xz, eye.to_sun.xz), 1e-20));
+    let azimuth = clamp(dot(dir.xz, eye.to_sun.xz) * (over * flat), -1.0, 1.0);
+    let y = sqrt(max(1.0 - min(ratio, 1.0 / ratio), 0.0));
+    return SkyPlace(0.5 - 0.5 * azimuth, y, ratio > 1.0, dot(dir, eye.to_sun), 1.0);
+}
+
 /// Place of a unit vector `dir` in the tables of an eye within the air.
 ///
 /// domain  eye.to_sun in [-1, 1] 1 lin
@@ -95,14 +110,8 @@ fn sun_ends(suns: vec2<f32>) -> vec2<f32> {
 /// outside undefined
 /// source  ours
 fn sky_place_inside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
-    // Tangent of half the zenith angle over that of the horizon, or the same from the nadir.
-    let aside = dot(dir.xz, dir.xz);
-    let over = inverseSqrt(max(aside, 1e-20));
-    let ratio = max(aside, 1e-20) * over / max((1.0 + dir.y) * eye.horizon, 1e-20);
-    let flat = inverseSqrt(max(dot(eye.to_sun.xz, eye.to_sun.xz), 1e-20));
-    let azimuth = clamp(dot(dir.xz, eye.to_sun.xz) * (over * flat), -1.0, 1.0);
-    let y = sqrt(max(1.0 - min(ratio, 1.0 / ratio), 0.0));
-    let below = ratio > 1.0;
+    var place = sky_place_shown(eye, dir);
+    let below = place.below;
     let along = (eye.ground_radius + eye.altitude) * dir.y;
     let level = select(eye.top, 0.0, below);
     let gain = (level - eye.altitude) * (2.0 * eye.ground_radius + eye.altitude + level);
@@ -111,8 +120,8 @@ fn sky_place_inside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
     if !below && along < 0.0 {
         length = root - along;
     }
-    let reach = select(length / eye.top, 1.0, below && eye.shows_ground != 0u);
-    return SkyPlace(0.5 - 0.5 * azimuth, y, below, dot(dir, eye.to_sun), reach);
+    place.reach = select(length / eye.top, 1.0, eye.shows_ground != 0u);
+    return place;
 }
 
 /// Place of a unit vector `dir` in the tables of an eye above the air.
@@ -251,7 +260,7 @@ fn decode_dusk(code: vec3<f32>) -> vec3<f32> {
     return max(exp2(code) - DUSK, vec3<f32>(0.0));
 }
 
-/// Radiance of the sky, or of the air before the ground, for a sun of irradiance 1 and without its disc, read from the table.
+/// Radiance of the sky, or of the air before the ground, for a sun of irradiance 1 and without its disc, read from the table; `outside` says whether the eye is above the air.
 ///
 /// domain  place.x in [0, 1] 1 lin
 /// domain  place.y in [0, 1] 1 lin
@@ -260,13 +269,13 @@ fn decode_dusk(code: vec3<f32>) -> vec3<f32> {
 /// range   [0, 1e6] 1/sr
 /// error   0.02 rel of reference::sky::Sky::single_scatter
 /// source  Hillaire2020
-fn sky_radiance(sky: texture_2d_array<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace) -> vec3<f32> {
+fn sky_radiance(sky: texture_2d_array<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace, outside: bool) -> vec3<f32> {
     let size = vec2<f32>(textureDimensions(sky));
     let at = vec2<f32>((place.x * (size.x - 1.0) + 0.5) / size.x, sky_row(eye, place.y, place.below, size.y));
     let smooth_light = textureSampleLevel(sky, linear, at, 0, 0.0).rgb;
     let peaked = textureSampleLevel(sky, linear, at, 1, 0.0).rgb;
     let factor = place.reach / eye.scale;
-    if eye.altitude > eye.top {
+    if outside {
         return (decode_dusk(smooth_light) + decode_dusk(peaked) * peak_phase(air, place.nu)) * factor;
     }
     return (smooth_light + peaked * peak_phase(air, place.nu)) * factor;

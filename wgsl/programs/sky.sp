@@ -79,7 +79,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #FRAGMENT{
     #CODE{
 #import veduta::atmosphere::medium::{Air}
-#import veduta::atmosphere::sky_view::{SkyEye, SkyPlace, sky_place_inside, sky_place_outside, sky_radiance}
+#import veduta::atmosphere::sky_view::{SkyEye, SkyPlace, sky_place_shown, sky_place_outside, sky_radiance}
 #ifdef AERIAL
 #import veduta::atmosphere::ray::{AirLight, air_ray}
 #import veduta::atmosphere::aerial::{aerial_light, aerial_depth}
@@ -119,12 +119,12 @@ fn place_of(dir: vec3<f32>) -> SkyPlace {
     if EYE_OUTSIDE != 0 {
         return sky_place_outside(eye, dir);
     }
-    return sky_place_inside(eye, dir);
+    return sky_place_shown(eye, dir);
 }
 
 // Behind the host's things: the sky, or the bare ground and the air before it.
 fn background(dir: vec3<f32>) -> vec3<f32> {
-    return sky_radiance(sky, linear, air, eye, place_of(dir));
+    return sky_radiance(sky, linear, air, eye, place_of(dir), EYE_OUTSIDE != 0);
 }
 
 #ifdef AERIAL

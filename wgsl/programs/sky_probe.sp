@@ -59,7 +59,7 @@ fn probe(@builtin(global_invocation_id) id: vec3<u32>) {
         if ray.meets_ground == 0u {
             found.transmittance = exp(-sun_depth(columns, linear, air, ray.altitude, ray.mu));
         }
-        found.in_scatter = sky_radiance(sky, linear, air, eye, place);
+        found.in_scatter = sky_radiance(sky, linear, air, eye, place, eye.altitude > eye.top);
     }
     results[id.x] = ProbeLight(found.in_scatter, found.transmittance);
 }
