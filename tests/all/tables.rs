@@ -266,8 +266,8 @@ fn row_a07_the_table_of_columns_is_right_at_every_height_and_angle() {
         let mut worst = 0.0_f64;
         for (ray, found) in some.iter().zip(&filtered) {
             let depth = medium::air_extinction(&air, by_hand(ray.altitude, ray.dir[1]));
-            for c in 0..3 {
-                worst = worst.max((f64::from(found.transmittance[c]) - (-depth[c]).exp()).abs());
+            for (own, depth) in found.transmittance.iter().zip(depth) {
+                worst = worst.max((f64::from(*own) - (-depth).exp()).abs());
             }
         }
         println!("{name}: filtered by the device and by hand: {worst:.1e} of the transmittance");
@@ -408,9 +408,9 @@ fn moments_of_diffuse_light_meet_paths() {
         let first = [0, 2, 4, 6].map(|k| f16([data[at + k], data[at + k + 1]]));
         let found = air_tables::decode_moments(first, [0.0; 4], [0.0; 4]);
         let (truth, error) = air_tables::diffuse_moments(&sky, h, sun_mu, 6000, 3);
-        for c in 0..3 {
+        for (c, error) in error.iter().enumerate() {
             let off = found.whole[c] / truth.whole[c] - 1.0;
-            let own = error[c] / truth.whole[c];
+            let own = error / truth.whole[c];
             println!(
                 "{h:.0} m, sun {sun_mu:.3}: {:.2} % +- {:.2} %",
                 100.0 * off,
@@ -739,7 +739,7 @@ fn seen(p: vec4f) -> vec3f {{ return sky_direction(eye(p.z), p.xy, p.w > 0.5); }
             }
             worst[1] = worst[1].max((found[1] - y).abs());
             // Beyond what a row holds, and without an azimuth, places lie on each other.
-            let ends = h > 1e5 && (x > 0.98 || x < 0.02);
+            let ends = h > 1e5 && !(0.02..=0.98).contains(&x);
             if steep > 0.02 && !ends {
                 worst[0] = worst[0].max((found[0] - x).abs());
             }
