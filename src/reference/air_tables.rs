@@ -389,7 +389,7 @@ pub struct SkyPlace {
 /// Cosine of the azimuth from the sun; 0 for a vertical direction.
 fn azimuth_cosine(eye: &SkyEye, dir: [f64; 3]) -> f64 {
     let [sx, _, sz] = eye.to_sun;
-    let across = (dir[0].hypot(dir[2]) * sx.hypot(sz)).max(1e-10);
+    let across = dir[0].hypot(dir[2]).max(1e-10) * sx.hypot(sz).max(1e-10);
     ((dir[0] * sx + dir[2] * sz) / across).clamp(-1.0, 1.0)
 }
 
@@ -423,6 +423,7 @@ pub fn sky_place_inside(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
 const TERMINATOR_BEND: f64 = 0.1;
 const TERMINATOR: f64 = -0.1;
 const DARKEST_SUN: f64 = -0.45;
+const LEAST_SUNS: f64 = 1e-3;
 const DUSK: f64 = 1.0 / 16_777_216.0;
 
 fn bend_terminator(mu: f64) -> f64 {
@@ -447,7 +448,10 @@ fn seen_suns(eye: &SkyEye, zenith: f64, lowest: f64) -> [f64; 2] {
 /// The bent zenith cosines at both ends of a row.
 fn sun_ends([factor, offset]: [f64; 2]) -> [f64; 2] {
     let first = offset + factor;
-    let last = (offset - factor).max((first - 1e-3).min(DARKEST_SUN));
+    let mut last = offset - factor;
+    if first > DARKEST_SUN + 0.1 {
+        last = last.max(DARKEST_SUN);
+    }
     [bend_terminator(first), bend_terminator(last)]
 }
 
@@ -466,9 +470,14 @@ pub fn sky_place_outside(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
     };
     let suns = seen_suns(&eye, zenith, lowest);
     let ends = sun_ends(suns);
-    let sun = bend_terminator(suns[1] + suns[0] * azimuth_cosine(&eye, dir));
+    let cosine = azimuth_cosine(&eye, dir);
+    let x = if suns[0] > LEAST_SUNS {
+        (ends[0] - bend_terminator(suns[1] + suns[0] * cosine)) / (ends[0] - ends[1])
+    } else {
+        0.5 * (1.0 - cosine)
+    };
     SkyPlace {
-        x: ((ends[0] - sun) / (ends[0] - ends[1]).max(1e-6)).clamp(0.0, 1.0),
+        x: x.clamp(0.0, 1.0),
         y: y.clamp(0.0, 4.0).sqrt(),
         below,
         nu: dot(dir, eye.to_sun),
@@ -516,7 +525,9 @@ pub fn sky_direction(eye: SkyEye, place: [f64; 2], below: bool) -> [f64; 3] {
         let ends = sun_ends(suns);
         let bent = ends[0] + (ends[1] - ends[0]) * place[0];
         let sun = TERMINATOR + (TERMINATOR_BEND * bent.abs().exp_m1()).copysign(bent);
-        cosine = ((sun - suns[1]) / suns[0].max(1e-6)).clamp(-1.0, 1.0);
+        if suns[0] > LEAST_SUNS {
+            cosine = ((sun - suns[1]) / suns[0]).clamp(-1.0, 1.0);
+        }
     }
     let around = eye.to_sun[2].hypot(eye.to_sun[0]);
     let ahead = if around > 1e-10 {

@@ -220,6 +220,10 @@ impl<'a> Work<'a> {
             .iter()
             .map(|p| match p {
                 Prepare::Unit(name) | Prepare::Whole(name) => samples.columns_of(name),
+                Prepare::Horizon(name) => ["altitude", "ground_radius", "horizon"]
+                    .iter()
+                    .flat_map(|member| samples.columns_of(&format!("{name}.{member}")))
+                    .collect(),
                 Prepare::Ascending(names) => names
                     .iter()
                     .flat_map(|name| samples.columns_of(name))
@@ -322,6 +326,14 @@ impl<'a> Work<'a> {
                     }
                 }
                 Prepare::Whole(_) => values.iter_mut().for_each(|v| *v = v.round()),
+                Prepare::Horizon(_) => {
+                    if let [altitude, radius, horizon] = &mut values[..] {
+                        let r = *radius + *altitude;
+                        let cosine = (*altitude * (2.0 * *radius + *altitude)).sqrt() / r;
+                        // tan(z / 2) = (1 - cos z) / sin z
+                        *horizon = (1.0 + cosine) * r / *radius;
+                    }
+                }
                 Prepare::Ascending(_) => values.sort_by(f64::total_cmp),
             }
             for (k, value) in columns.iter().zip(values) {

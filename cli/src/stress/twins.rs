@@ -505,6 +505,8 @@ pub enum Prepare {
     Ascending(&'static [&'static str]),
     /// Numbers are rounded to whole ones.
     Whole(&'static str),
+    /// An eye's horizon follows from its altitude and the ground's radius.
+    Horizon(&'static str),
 }
 
 impl Prepare {
@@ -513,6 +515,7 @@ impl Prepare {
         match self {
             Prepare::Unit(name) => format!("{name} a unit vector"),
             Prepare::Whole(name) => format!("{name} whole"),
+            Prepare::Horizon(name) => format!("{name}.horizon where it is"),
             Prepare::Ascending(names) => format!("{} ascending", names.join(", ")),
         }
     }
@@ -590,6 +593,7 @@ impl Entry {
     }
 
     fn domain(mut self, name: &'static str, lo: f64, hi: f64, spacing: Spacing) -> Entry {
+        self.domains.retain(|d| d.name != name);
         self.domains.push(OwnDomain {
             name,
             interval: Interval {
@@ -619,6 +623,11 @@ impl Entry {
 
     fn unit(mut self, name: &'static str) -> Entry {
         self.prepare.push(Prepare::Unit(name));
+        self
+    }
+
+    fn horizon(mut self, name: &'static str) -> Entry {
+        self.prepare.push(Prepare::Horizon(name));
         self
     }
 
@@ -711,6 +720,7 @@ impl Entry {
             .lin("eye.shows_ground", 0.0, 1.0)
             .lin("eye.to_sun", -1.0, 1.0)
             .unit("eye.to_sun")
+            .horizon("eye")
     }
 
     fn layer(self) -> Entry {
