@@ -737,6 +737,10 @@ fn seen(p: vec4f) -> vec3f {{ return sky_direction(eye(p.z), p.xy, p.w > 0.5); }
                 assert!(y < 0.01, "{altitude} {row:?} {found:?}");
                 continue;
             }
+            if y > 0.999 && found[1] > 1.0 {
+                // At the top of the limb f32 may choose a miss.
+                continue;
+            }
             worst[1] = worst[1].max((found[1] - y).abs());
             // Beyond what a row holds, and without an azimuth, places lie on each other.
             let ends = h > 1e5 && !(0.02..=0.98).contains(&x);
