@@ -117,6 +117,15 @@ impl FastProbe {
         let _ = self.tables.prepare(queue, &mut encoder, eye)?;
         let tables = &self.tables;
         let view = wgpu::BindingResource::TextureView;
+        let mut read = vec![
+            (0, wgpu::BindingResource::Sampler(tables.sampler())),
+            (1, view(tables.sky())),
+            (4, exchange.input.as_entire_binding()),
+            (5, view(tables.columns())),
+            (6, view(tables.diffuse())),
+        ];
+        let before = [(2, tables.aerial()), (3, tables.aerial_depths())];
+        read.extend(before.into_iter().filter_map(|(k, t)| Some((k, view(t?)))));
         let groups = bind_groups(
             device,
             "veduta probe",
@@ -126,15 +135,7 @@ impl FastProbe {
                     (0, tables.air().as_entire_binding()),
                     (1, tables.eye().as_entire_binding()),
                 ],
-                &[
-                    (0, wgpu::BindingResource::Sampler(tables.sampler())),
-                    (1, view(tables.sky())),
-                    (2, view(tables.aerial())),
-                    (3, view(tables.aerial_depths())),
-                    (4, exchange.input.as_entire_binding()),
-                    (5, view(tables.columns())),
-                    (6, view(tables.diffuse())),
-                ],
+                &read,
                 &[(0, exchange.output.as_entire_binding())],
             ],
         );

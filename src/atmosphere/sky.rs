@@ -4,7 +4,7 @@ use glam::{Vec3, Vec4};
 
 use crate::error::Error;
 use crate::landscape::{Depth, Projection, Resources, Targets, Work};
-use crate::program::{Pipeline, PipelineOptions, ProgramSet, ReadyPipeline};
+use crate::program::{ComposedProgram, Pipeline, PipelineOptions, ProgramSet, ReadyPipeline};
 use crate::programs::blocks::SkyDraw as DrawBlock;
 use crate::settings::{Preset, Settings};
 use crate::view::View;
@@ -77,19 +77,32 @@ pub struct Sky {
     tables: SkyTables,
     targets: Targets,
     composition: SkyComposition,
-    /// For an eye within the air, and for one above it.
-    pipelines: [Pass; 2],
-    outside: bool,
-    layouts: Vec<wgpu::BindGroupLayout>,
+    /// What passes are made from when an eye first needs one.
+    maker: PassMaker,
+    /// By [`EyePlace`].
+    passes: [Option<Pass>; 3],
+    place: EyePlace,
     draw: wgpu::Buffer,
     draw_bytes: Vec<u8>,
     host: Option<wgpu::BindGroup>,
+}
+
+/// Where the eye is: the values of the override `EYE_PLACE`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum EyePlace {
+    /// Low in the air.
+    Low = 0,
+    /// So high that its table holds codes.
+    High = 1,
+    /// Above the air.
+    Outside = 2,
 }
 
 /// A pipeline with what is bound to it.
 #[derive(Debug)]
 struct Layer {
     pipeline: wgpu::RenderPipeline,
+    layouts: Vec<wgpu::BindGroupLayout>,
     groups: Vec<wgpu::BindGroup>,
 }
 
@@ -98,6 +111,106 @@ struct Layer {
 struct Pass {
     sky: Layer,
     disc: Option<Layer>,
+}
+
+/// What passes are made from.
+#[derive(Debug)]
+struct PassMaker {
+    device: wgpu::Device,
+    sky: ComposedProgram,
+    disc: Option<ComposedProgram>,
+    formats: Vec<Option<wgpu::ColorTargetState>>,
+    depth_stencil: Option<wgpu::DepthStencilState>,
+    sample_count: u32,
+    output: f64,
+}
+
+impl PassMaker {
+    fn pass(
+        &self,
+        tables: &SkyTables,
+        draw: &wgpu::Buffer,
+        place: EyePlace,
+    ) -> Result<Pass, Error> {
+        let layer = |program: &ComposedProgram| self.layer(program, tables, draw, place);
+        Ok(Pass {
+            sky: layer(&self.sky)?,
+            disc: self.disc.as_ref().map(layer).transpose()?,
+        })
+    }
+
+    fn layer(
+        &self,
+        program: &ComposedProgram,
+        tables: &SkyTables,
+        draw: &wgpu::Buffer,
+        place: EyePlace,
+    ) -> Result<Layer, Error> {
+        let constants: Vec<(&str, f64)> = program
+            .overrides
+            .iter()
+            .map(|o| {
+                let value = if o.name == "OUTPUT" {
+                    self.output
+                } else {
+                    f64::from(place as u8)
+                };
+                (o.name.as_ref(), value)
+            })
+            .collect();
+        let ReadyPipeline {
+            pipeline,
+            bind_group_layouts: layouts,
+        } = program.pipeline(
+            &self.device,
+            &PipelineOptions {
+                targets: &self.formats,
+                depth_stencil: self.depth_stencil.clone(),
+                sample_count: self.sample_count,
+                constants: &constants,
+                ..Default::default()
+            },
+        )?;
+        let Pipeline::Render(pipeline) = pipeline else {
+            return Err(Error::MissingStage {
+                program: "sky".to_owned(),
+            });
+        };
+        // A variant has only the bindings that it reads.
+        let has = |group: u32, binding: u32| {
+            program
+                .bindings
+                .iter()
+                .any(|b| b.group == group && b.binding == binding)
+        };
+        let view = wgpu::BindingResource::TextureView;
+        let mut first = vec![
+            (0, tables.air().as_entire_binding()),
+            (1, tables.eye().as_entire_binding()),
+            (2, draw.as_entire_binding()),
+            (3, tables.look().as_entire_binding()),
+        ];
+        first.retain(|(binding, _)| has(0, *binding));
+        let before = [(2, tables.aerial()), (3, tables.aerial_depths())];
+        let mut second = vec![
+            (0, wgpu::BindingResource::Sampler(tables.sampler())),
+            (1, view(tables.sky())),
+            (4, view(tables.columns())),
+        ];
+        second.extend(before.into_iter().filter_map(|(k, t)| Some((k, view(t?)))));
+        second.retain(|(binding, _)| has(1, *binding));
+        let groups = bind_groups(
+            &self.device,
+            "veduta sky",
+            &layouts[..2],
+            &[&first, &second],
+        );
+        Ok(Layer {
+            pipeline,
+            layouts,
+            groups,
+        })
+    }
 }
 
 impl Sky {
@@ -133,7 +246,8 @@ impl Sky {
         }
         let settings = Settings::resolve(programs, &options.preset, None, &[])?;
         let quality = SkyQuality::of(&settings);
-        let tables = SkyTables::with_ground(device, programs, &options.atmosphere, &quality)?;
+        let tables =
+            SkyTables::of_sky(device, programs, &options.atmosphere, &quality, reads_depth)?;
         let mut features = options.atmosphere.features().to_vec();
         match options.composition {
             SkyComposition::Background => {}
@@ -165,94 +279,43 @@ impl Sky {
         let format = Some(targets.color_format.into());
         let both = [format.clone(), format];
         let count = 1 + usize::from(options.composition == SkyComposition::TwoTargets);
-        let mut layouts = Vec::new();
-        let mut pass = |outside: bool| -> Result<Pass, Error> {
-            let mut layer = |features: &[&str]| {
-                let program = programs.get("sky", features)?;
-                let constants: Vec<(&str, f64)> = program
-                    .overrides
-                    .iter()
-                    .map(|o| {
-                        let value = if o.name == "OUTPUT" {
-                            output
-                        } else {
-                            f64::from(u8::from(outside))
-                        };
-                        (o.name.as_ref(), value)
-                    })
-                    .collect();
-                let ReadyPipeline {
-                    pipeline,
-                    bind_group_layouts,
-                } = program.pipeline(
-                    device,
-                    &PipelineOptions {
-                        targets: &both[..count],
-                        depth_stencil: depth_stencil.clone(),
-                        sample_count: targets.sample_count,
-                        constants: &constants,
-                        ..Default::default()
-                    },
-                )?;
-                let Pipeline::Render(pipeline) = pipeline else {
-                    return Err(Error::MissingStage {
-                        program: "sky".to_owned(),
-                    });
-                };
-                // A variant has only the bindings that it reads.
-                let has = |group: u32, binding: u32| {
-                    program
-                        .bindings
-                        .iter()
-                        .any(|b| b.group == group && b.binding == binding)
-                };
-                let view = wgpu::BindingResource::TextureView;
-                let mut first = vec![
-                    (0, tables.air().as_entire_binding()),
-                    (1, tables.eye().as_entire_binding()),
-                    (2, draw.as_entire_binding()),
-                ];
-                first.retain(|(binding, _)| has(0, *binding));
-                let mut second = vec![
-                    (0, wgpu::BindingResource::Sampler(tables.sampler())),
-                    (1, view(tables.sky())),
-                    (2, view(tables.aerial())),
-                    (3, view(tables.aerial_depths())),
-                ];
-                second.retain(|(binding, _)| has(1, *binding));
-                let groups = bind_groups(
-                    device,
-                    "veduta sky",
-                    &bind_group_layouts[..2],
-                    &[&first, &second],
-                );
-                if bind_group_layouts.len() > 2 {
-                    layouts = bind_group_layouts;
-                }
-                Ok(Layer { pipeline, groups })
-            };
-            let sky = layer(&features)?;
-            let disc = if reads_depth || targets.projection == Projection::Orthographic {
+        let maker = PassMaker {
+            device: device.clone(),
+            sky: programs.get("sky", &features)?.clone(),
+            disc: if reads_depth || targets.projection == Projection::Orthographic {
                 None
             } else {
-                let mut features = features.clone();
                 features.push("SUN_DISC");
-                Some(layer(&features)?)
-            };
-            Ok(Pass { sky, disc })
+                Some(programs.get("sky", &features)?.clone())
+            },
+            formats: both[..count].to_vec(),
+            depth_stencil,
+            sample_count: targets.sample_count,
+            output,
         };
-        let pipelines = [pass(false)?, pass(true)?];
-        Ok(Sky {
+        let mut sky = Sky {
             tables,
             targets: *targets,
             composition: options.composition,
-            pipelines,
-            outside: false,
-            layouts,
+            maker,
+            passes: [None, None, None],
+            place: EyePlace::Low,
             draw,
             draw_bytes: Vec::new(),
             host: None,
-        })
+        };
+        sky.pass(EyePlace::Low)?;
+        Ok(sky)
+    }
+
+    /// The pass for an eye, made when there is none.
+    fn pass(&mut self, place: EyePlace) -> Result<&Pass, Error> {
+        let held = &mut self.passes[place as usize];
+        let pass = match held.take() {
+            Some(pass) => pass,
+            None => self.maker.pass(&self.tables, &self.draw, place)?,
+        };
+        Ok(held.insert(pass))
     }
 
     /// The tables.
@@ -269,8 +332,9 @@ impl Sky {
     pub fn resources(&self) -> Resources {
         let tables = self.tables.resources();
         let layers = || {
-            self.pipelines
+            self.passes
                 .iter()
+                .flatten()
                 .flat_map(|pass| [Some(&pass.sky), pass.disc.as_ref()])
                 .flatten()
         };
@@ -320,10 +384,11 @@ impl Sky {
             }
             (SkyComposition::TwoTargets, _) => {}
         }
+        let layouts = &self.pass(self.place)?.sky.layouts;
         self.host = bind_groups(
             device,
             "veduta host",
-            self.layouts.get(2..).unwrap_or_default(),
+            layouts.get(2..).unwrap_or_default(),
             &[&bound],
         )
         .pop();
@@ -351,7 +416,17 @@ impl Sky {
         let reads_depth = self.composition != SkyComposition::Background;
         let block = draw_block(&self.targets, reads_depth, colour, view)?;
         let mut work = self.tables.prepare(queue, encoder, &eye)?;
-        self.outside = eye.altitude as f32 > self.tables.atmosphere().thickness as f32;
+        let altitude = eye.altitude as f32;
+        let top = self.tables.atmosphere().thickness as f32;
+        // As `sky_coded` of the modules has it.
+        self.place = if altitude > top {
+            EyePlace::Outside
+        } else if altitude > 0.1 * top {
+            EyePlace::High
+        } else {
+            EyePlace::Low
+        };
+        self.pass(self.place)?;
         let bytes = block.to_bytes().to_vec();
         if bytes != self.draw_bytes {
             queue.write_buffer(&self.draw, 0, &bytes);
@@ -374,8 +449,11 @@ impl Sky {
                 domain: "what `Sky::set_host` has been given".to_owned(),
             });
         }
-        let Pass { sky, disc } = &self.pipelines[usize::from(self.outside)];
         let mut work = Work::default();
+        // `prepare` has made it; the first is there from the start.
+        let Some(Pass { sky, disc }) = &self.passes[self.place as usize] else {
+            return Ok(work);
+        };
         for (layer, vertices) in [(Some(sky), 3), (disc.as_ref(), 6)] {
             let Some(layer) = layer else {
                 continue;

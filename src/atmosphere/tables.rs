@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::landscape::{Resources, Work};
 use crate::program::{Pipeline, PipelineOptions, ProgramSet, ReadyPipeline};
-use crate::programs::blocks::SkyEye as EyeBlock;
+use crate::programs::blocks::{SkyEye as EyeBlock, SkyLook as LookBlock};
 use crate::settings::Settings;
 
 use super::Atmosphere;
@@ -298,23 +298,33 @@ pub struct SkyTables {
     shows_ground: bool,
     air: wgpu::Buffer,
     eye: wgpu::Buffer,
+    look: wgpu::Buffer,
     sampler: wgpu::Sampler,
     columns: Table,
     moments: [Table; 3],
     sky: Table,
-    aerial: Table,
-    depths: Table,
+    /// Light and depths of the air before things, and the pass that makes them.
+    before: Option<Before>,
     bake_columns: Bake,
     bake_moments: Vec<Bake>,
     bake_sky: Bake,
-    bake_aerial: Bake,
     /// What the buffer `air` holds.
     air_bytes: Vec<u8>,
     /// What the buffer `eye` holds.
     eye_bytes: Vec<u8>,
+    /// What the buffer `look` holds.
+    look_bytes: Vec<u8>,
     columns_of: Option<Vec<u8>>,
     moments_of: Option<Vec<u8>>,
     eye_of: Option<EyeKey>,
+}
+
+/// The tables of the air before things.
+#[derive(Debug)]
+struct Before {
+    light: Table,
+    depths: Table,
+    bake: Bake,
 }
 
 /// What the tables of an eye depend on, besides the air.
@@ -336,7 +346,7 @@ impl SkyTables {
         atmosphere: &Atmosphere,
         quality: &SkyQuality,
     ) -> Result<SkyTables, Error> {
-        SkyTables::build(device, programs, atmosphere, quality, false)
+        SkyTables::build(device, programs, atmosphere, quality, [false, true])
     }
 
     /// As [`SkyTables::new`], but the table of the sky shows the bare ground in directions below the horizon.
@@ -349,7 +359,18 @@ impl SkyTables {
         atmosphere: &Atmosphere,
         quality: &SkyQuality,
     ) -> Result<SkyTables, Error> {
-        SkyTables::build(device, programs, atmosphere, quality, true)
+        SkyTables::build(device, programs, atmosphere, quality, [true, true])
+    }
+
+    /// As [`SkyTables::with_ground`]; without the air before things unless a picture asks for it.
+    pub(super) fn of_sky(
+        device: &wgpu::Device,
+        programs: &ProgramSet,
+        atmosphere: &Atmosphere,
+        quality: &SkyQuality,
+        before: bool,
+    ) -> Result<SkyTables, Error> {
+        SkyTables::build(device, programs, atmosphere, quality, [true, before])
     }
 
     fn build(
@@ -357,7 +378,7 @@ impl SkyTables {
         programs: &ProgramSet,
         atmosphere: &Atmosphere,
         quality: &SkyQuality,
-        ground: bool,
+        [ground, before]: [bool; 2],
     ) -> Result<SkyTables, Error> {
         quality.check()?;
         let bytes = atmosphere.air_bytes()?;
@@ -371,6 +392,7 @@ impl SkyTables {
         };
         let air = buffer("veduta air", bytes.len() as u64);
         let eye = buffer("veduta eye", EyeBlock::SIZE as u64);
+        let look = buffer("veduta look at the sky", LookBlock::SIZE as u64);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("veduta tables"),
             mag_filter: wgpu::FilterMode::Linear,
@@ -382,18 +404,6 @@ impl SkyTables {
         let moments =
             [1, 2, 3].map(|_| Table::new(device, "veduta diffuse light", quality.diffuse, Some(3)));
         let sky = Table::new(device, "veduta sky", quality.sky, Some(2));
-        let aerial = Table::new(
-            device,
-            "veduta air before things",
-            quality.aerial,
-            Some(2 * quality.aerial_slices),
-        );
-        let depths = Table::new(
-            device,
-            "veduta depths",
-            [quality.aerial_slices, quality.aerial[1]],
-            None,
-        );
         let air_bound = (0, air.as_entire_binding());
         let eye_bound = (1, eye.as_entire_binding());
         let linear = (0, wgpu::BindingResource::Sampler(&sampler));
@@ -472,30 +482,49 @@ impl SkyTables {
             ),
             workgroups: groups_of(quality.sky, [8, 8]),
         };
-        let (pipeline, layouts) = compute(
-            device,
-            programs,
-            atmosphere,
-            "sky_aerial",
-            &[
-                ("AERIAL_STEPS", f64::from(quality.aerial_steps)),
-                ("AERIAL_SLICES", f64::from(quality.aerial_slices)),
-                ("ALL_ORDERS", all),
-            ],
-        )?;
-        let bake_aerial = Bake {
-            pipeline,
-            groups: bind_groups(
+        let before = if before {
+            let [width, height] = quality.aerial;
+            let slices = quality.aerial_slices;
+            let light = Table::new(
+                device,
+                "veduta air before things",
+                [width, height],
+                Some(2 * slices),
+            );
+            let depths = Table::new(device, "veduta depths", [slices, height], None);
+            let (pipeline, layouts) = compute(
+                device,
+                programs,
+                atmosphere,
+                "sky_aerial",
+                &[
+                    ("AERIAL_STEPS", f64::from(quality.aerial_steps)),
+                    ("AERIAL_SLICES", f64::from(slices)),
+                    ("ALL_ORDERS", all),
+                ],
+            )?;
+            let groups = bind_groups(
                 device,
                 "veduta air before things",
                 &layouts,
                 &[
                     &[air_bound, eye_bound],
                     &read,
-                    &[at(0, &aerial), at(1, &depths)],
+                    &[at(0, &light), at(1, &depths)],
                 ],
-            ),
-            workgroups: groups_of(quality.aerial, [4, 8]),
+            );
+            let bake = Bake {
+                pipeline,
+                groups,
+                workgroups: groups_of(quality.aerial, [4, 8]),
+            };
+            Some(Before {
+                light,
+                depths,
+                bake,
+            })
+        } else {
+            None
         };
         Ok(SkyTables {
             atmosphere: atmosphere.clone(),
@@ -503,18 +532,18 @@ impl SkyTables {
             shows_ground: ground,
             air,
             eye,
+            look,
             sampler,
             columns,
             moments,
             sky,
-            aerial,
-            depths,
+            before,
             bake_columns,
             bake_moments,
             bake_sky,
-            bake_aerial,
             air_bytes: Vec::new(),
             eye_bytes: Vec::new(),
+            look_bytes: Vec::new(),
             columns_of: None,
             moments_of: None,
             eye_of: None,
@@ -563,6 +592,7 @@ impl SkyTables {
     ) -> Result<Work, Error> {
         eye.check()?;
         let block = self.eye_block(eye);
+        let look = self.look_block(&block).to_bytes().to_vec();
         let (mut work, air_anew) = self.air_work(queue, encoder)?;
         upload(
             queue,
@@ -571,6 +601,7 @@ impl SkyTables {
             block.to_bytes().to_vec(),
             &mut work,
         );
+        upload(queue, &self.look, &mut self.look_bytes, look, &mut work);
         let key = EyeKey {
             altitude: block.altitude,
             sun_height: block.to_sun[1],
@@ -581,8 +612,11 @@ impl SkyTables {
         }
         if self.eye_of != Some(key) {
             self.bake_sky.record(encoder, "veduta sky", &mut work);
-            self.bake_aerial
-                .record(encoder, "veduta air before things", &mut work);
+            if let Some(before) = &self.before {
+                before
+                    .bake
+                    .record(encoder, "veduta air before things", &mut work);
+            }
             self.eye_of = Some(key);
         }
         Ok(work)
@@ -651,18 +685,55 @@ impl SkyTables {
         }
     }
 
+    fn look_block(&self, eye: &EyeBlock) -> LookBlock {
+        let [width, rows] = self.quality.sky.map(f64::from);
+        let [sx, _, sz] = eye.to_sun.map(f64::from);
+        let flat = sx.hypot(sz);
+        let across = 0.5 * (width - 1.0) / width;
+        let ahead = if flat > 1e-10 {
+            [sx, sz].map(|c| (across * c / flat) as f32)
+        } else {
+            [0.0; 2]
+        };
+        let above = (0.75 * rows).floor();
+        let peak = self.atmosphere.peak();
+        let (g, level, square) = peak.map_or((0.0, 0.0, 0.0), |p| (p.g, p.level, p.square));
+        LookBlock {
+            to_sun: eye.to_sun,
+            horizon: eye.horizon,
+            ahead,
+            above: (0.5 / rows) as f32,
+            above_rise: ((above - 1.0) / rows) as f32,
+            below: ((above + 0.5) / rows) as f32,
+            below_rise: ((rows - above - 1.0) / rows) as f32,
+            gain: eye.scale.recip(),
+            peak_base: (1.0 + g * g) as f32,
+            peak_slope: (2.0 * g) as f32,
+            peak_level: level as f32,
+            peak_square: square as f32,
+            ..LookBlock::ZERO
+        }
+    }
+
     /// What the tables keep on the device.
     pub fn resources(&self) -> Resources {
-        let tables = [&self.columns, &self.sky, &self.aerial, &self.depths];
-        let tables: Vec<&Table> = tables.into_iter().chain(&self.moments).collect();
-        let bakes = [&self.bake_columns, &self.bake_sky, &self.bake_aerial];
-        let bakes: Vec<&Bake> = bakes.into_iter().chain(&self.bake_moments).collect();
+        let before = self.before.as_ref();
+        let tables: Vec<&Table> = [&self.columns, &self.sky]
+            .into_iter()
+            .chain(before.into_iter().flat_map(|b| [&b.light, &b.depths]))
+            .chain(&self.moments)
+            .collect();
+        let bakes: Vec<&Bake> = [&self.bake_columns, &self.bake_sky]
+            .into_iter()
+            .chain(before.map(|b| &b.bake))
+            .chain(&self.bake_moments)
+            .collect();
         Resources {
             pipelines: bakes.len() as u32,
             bind_groups: bakes.iter().map(|b| b.groups.len() as u32).sum(),
-            bindings: 2 + 3 * 5 + 2 * 6 + 1,
-            buffers: 2,
-            buffer_bytes: self.air.size() + self.eye.size(),
+            bindings: 2 + 3 * 5 + 6 + if before.is_some() { 7 } else { 0 },
+            buffers: 3,
+            buffer_bytes: self.air.size() + self.eye.size() + self.look.size(),
             textures: tables.len() as u32,
             texture_bytes: tables.iter().map(|t| t.bytes()).sum(),
             samplers: 1,
@@ -677,6 +748,11 @@ impl SkyTables {
     /// The block `SkyEye` of the modules.
     pub fn eye(&self) -> &wgpu::Buffer {
         &self.eye
+    }
+
+    /// The block `SkyLook` of the modules; for an eye within the air.
+    pub fn look(&self) -> &wgpu::Buffer {
+        &self.look
     }
 
     /// The sampler that the tables are read with.
@@ -699,14 +775,14 @@ impl SkyTables {
         &self.sky.view
     }
 
-    /// The light of the air before things.
-    pub fn aerial(&self) -> &wgpu::TextureView {
-        &self.aerial.view
+    /// The light of the air before things; none in the tables of a [`Sky`](super::Sky) that draws nothing before the host's picture.
+    pub fn aerial(&self) -> Option<&wgpu::TextureView> {
+        self.before.as_ref().map(|before| &before.light.view)
     }
 
-    /// The mean extinction of the air before things.
-    pub fn aerial_depths(&self) -> &wgpu::TextureView {
-        &self.depths.view
+    /// The mean extinction of the air before things; as [`SkyTables::aerial`].
+    pub fn aerial_depths(&self) -> Option<&wgpu::TextureView> {
+        self.before.as_ref().map(|before| &before.depths.view)
     }
 }
 

@@ -420,6 +420,62 @@ pub fn sky_place_inside(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
     }
 }
 
+/// What a picture needs of an eye within the air and its table of the sky.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkyLook {
+    /// Unit vector to the sun, y up at the eye.
+    pub to_sun: [f64; 3],
+    /// Tangent of half the zenith angle of the horizon.
+    pub horizon: f64,
+    /// Azimuth of the sun times what the table's x falls by towards it.
+    pub ahead: [f64; 2],
+    /// Row at the horizon, above it.
+    pub above: f64,
+    /// From there to the zenith.
+    pub above_rise: f64,
+    /// Row at the horizon, below it.
+    pub below: f64,
+    /// From there to the nadir.
+    pub below_rise: f64,
+    /// What the table's values are multiplied with.
+    pub gain: f64,
+    /// 1 + g^2 of the peaked phase function.
+    pub peak_base: f64,
+    /// Its 2 g.
+    pub peak_slope: f64,
+    /// Its level.
+    pub peak_level: f64,
+    /// Its coefficient of nu^2.
+    pub peak_square: f64,
+}
+
+/// Where a direction is in the table of an eye within the air.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkyTexel {
+    /// Column and row.
+    pub at: [f64; 2],
+    /// Cosine of the angle to the sun.
+    pub nu: f64,
+}
+
+/// Where a direction, a vector of any length, is in the table of an eye within the air.
+pub fn sky_texel(look: SkyLook, ray: [f64; 3]) -> SkyTexel {
+    let flat = ray[0].hypot(ray[2]).max(1e-15);
+    let ratio = (0.5 * flat.atan2(ray[1])).tan() / look.horizon;
+    let height = (1.0 - ratio.min(1.0 / ratio)).max(0.0).sqrt();
+    SkyTexel {
+        at: [
+            0.5 - (ray[0] * look.ahead[0] + ray[2] * look.ahead[1]) / flat,
+            if ratio > 1.0 {
+                look.below + look.below_rise * height
+            } else {
+                look.above + look.above_rise * height
+            },
+        ],
+        nu: dot(ray, look.to_sun) / flat.hypot(ray[1]),
+    }
+}
+
 const TERMINATOR_BEND: f64 = 0.1;
 const TERMINATOR: f64 = -0.1;
 const DARKEST_SUN: f64 = -0.45;
@@ -543,6 +599,11 @@ pub fn sky_direction(eye: SkyEye, place: [f64; 2], below: bool) -> [f64; 3] {
     ]
 }
 
+/// Whether the table of the sky holds codes.
+pub fn sky_coded(eye: SkyEye) -> f64 {
+    f64::from(u8::from(eye.altitude > f64::from(0.1_f32) * eye.top))
+}
+
 /// The code of light in the table of the sky of an eye above the air.
 pub fn encode_dusk(light: [f64; 3]) -> [f64; 3] {
     light.map(|l| (l.max(0.0) + DUSK).log2())
@@ -556,7 +617,7 @@ pub fn decode_dusk(code: [f64; 3]) -> [f64; 3] {
 /// Rows of the table of the sky above the horizon.
 pub fn sky_rows(eye: SkyEye, rows: f64) -> f64 {
     if eye.altitude > eye.top {
-        (rows / 3.0).floor()
+        (0.5 * rows).floor()
     } else {
         (0.75 * rows).floor()
     }

@@ -396,7 +396,8 @@ fn air_before_things_is_that_of_the_probe_with_every_depth() {
             kept.len()
         );
         assert!(kept.len() > 1000);
-        assert!(worst_before < 0.01 && clear_worst < 1e-3);
+        // The sky alone shares reads between neighbours, here a degree apart.
+        assert!(worst_before < 0.01 && clear_worst < 0.01);
 
         if depth == Depth::Reversed || depth == Depth::ReversedInfinite && !parallel {
             let mut two = sky_with(&targets, SkyComposition::TwoTargets, Preset::Medium);
@@ -441,8 +442,11 @@ fn no_seam_between_far_black_things_and_the_sky() {
         let floor = 1e-3 * brightest(&alone);
         let r = Atmosphere::default().planet_radius;
         let horizon = -(1.0 - (r / (r + altitude)).powi(2)).sqrt();
+        // Two neighbours share what they read of the sky, so that the edge of the ground is sharp to two.
         let seam = worst(&things, &alone, floor, |i| {
-            ray_of(&view, i).normalize().y > horizon
+            [i, i ^ 1]
+                .iter()
+                .all(|&i| ray_of(&view, i).normalize().y > horizon)
         });
         println!("{altitude} m: {seam:.5}");
         assert!(seam < 0.02, "{altitude} m: {seam}");
@@ -748,8 +752,8 @@ fn a_still_frame_makes_nothing_anew() {
     let view = looking(100.0, [0.0, 10.0, 60.0], [30.0, 40.0]);
     assert_eq!(
         work(&view),
-        (6, 6, 3),
-        "the air's four tables, the eye's two"
+        (5, 5, 4),
+        "the air's four tables, the eye's sky"
     );
     assert_eq!(work(&view), (0, 0, 0), "still");
     let turned = looking(100.0, [70.0, -20.0, 40.0], [30.0, 40.0]);
@@ -759,10 +763,10 @@ fn a_still_frame_makes_nothing_anew() {
     assert_eq!(work(&moved), (0, 0, 0), "elsewhere at this altitude");
     let later = looking(100.0, [70.0, -20.0, 40.0], [31.0, 40.0]);
     let (bakes, dispatches, writes) = work(&later);
-    assert_eq!((bakes, dispatches), (2, 2), "another sun");
-    assert!(writes <= 2);
+    assert_eq!((bakes, dispatches), (1, 1), "another sun");
+    assert!(writes <= 3);
     let higher = looking(200.0, [70.0, -20.0, 40.0], [31.0, 40.0]);
-    assert_eq!(work(&higher).0, 2, "another altitude");
+    assert_eq!(work(&higher).0, 1, "another altitude");
 }
 
 #[test]
@@ -1221,4 +1225,73 @@ fn arcs_of_the_sky_are_as_smooth_as_the_reference() {
     for (factor, arc) in factors.iter().take(failing.max(4)) {
         println!("{factor:8.2}  {arc}");
     }
+}
+
+/// Pictures of the tables of `Sky`, which show the ground and share reads between pixels, against rays read from tables of the finest quality.
+#[test]
+fn what_the_sky_draws_is_what_the_probe_finds() {
+    let gpu = gpu();
+    let air = Atmosphere::default();
+    let irradiance =
+        View::default().sun.irradiance * Vec3::from_array(air.sun.colour.map(|c| c as f32));
+    let mut sky = background(Preset::High);
+    let mut errors = Vec::new();
+    for (altitude, pitch) in [
+        (2.0, 12.0),
+        (2.0, 3.0),
+        (2e3, 0.0),
+        (1.5e4, -4.0),
+        (9e4, -6.0),
+    ] {
+        for (height, azimuth) in [(50.0, 40.0), (12.0, 100.0), (0.5, 20.0), (-4.0, 30.0)] {
+            let view = looking(altitude, [10.0, pitch, 50.0], [height, azimuth]);
+            let shown = shoot(&mut sky, &view);
+            assert_eq!(shown.not_finite(), 0);
+            let to_sun = view.sun.to_light.as_dvec3().normalize();
+            let radius = air.planet_radius;
+            let dip = -(altitude * (2.0 * radius + altitude)).sqrt() / (radius + altitude);
+            // Above the horizon by more than a pixel, and beside the sun's disc.
+            let kept: Vec<usize> = (0..PIXELS)
+                .filter(|&i| {
+                    let dir = ray_of(&view, i).normalize();
+                    dir.y > dip + 0.01 && dir.dot(to_sun) < 0.9995
+                })
+                .collect();
+            let rays: Vec<ProbeRay> = kept
+                .iter()
+                .map(|&i| ProbeRay {
+                    altitude,
+                    dir: ray_of(&view, i).normalize().to_array(),
+                    to_sun: to_sun.to_array(),
+                    distance: f64::INFINITY,
+                })
+                .collect();
+            let quality = SkyQuality::finest();
+            let truth = FastProbe::new(&gpu.device, veduta::programs(), &air, &quality, 0)
+                .and_then(|mut p| p.run(&gpu.device, &gpu.queue, &rays))
+                .unwrap();
+            let mut own = Vec::new();
+            for (&i, light) in kept.iter().zip(&truth) {
+                for c in 0..3 {
+                    let found = shown.pixels[i][c] / irradiance[c];
+                    own.push(relative(found, light.in_scatter[c], 1e-6));
+                }
+            }
+            own.sort_by(f32::total_cmp);
+            let at = |share: f32| own[(share * (own.len() - 1) as f32) as usize];
+            println!(
+                "{altitude} m, sun at {height}: {} rays, median {:.4}, 99th centile {:.4}, worst {:.4}",
+                kept.len(),
+                at(0.5),
+                at(0.99),
+                at(1.0)
+            );
+            assert!(kept.len() > PIXELS / 4);
+            errors.extend(own);
+        }
+    }
+    errors.sort_by(f32::total_cmp);
+    let at = |share: f32| errors[(share * (errors.len() - 1) as f32) as usize];
+    println!("median {:.4}, 99th centile {:.4}", at(0.5), at(0.99));
+    assert!(at(0.5) < 0.005 && at(0.99) < 0.03);
 }

@@ -2,9 +2,9 @@
 //! source   Hillaire2020 (a table per eye); half-angle tangents, exact horizon, cosine of the azimuth: ours
 //! symbols  mu zenith cosine · x, y coordinates in [0, 1]: azimuth from the sun, and height above the horizon
 //!
-//! The first rows hold directions above the horizon, the others those below: of an eye within the air the last quarter, of an eye above it the last two thirds.
+//! The first rows hold directions above the horizon, the others those below: of an eye within the air the last quarter, of an eye above it half.
 //!
-//! A texel holds radiance for a sun of irradiance 1, over the reach of its direction and times the scale of the eye (of an eye above the air a code of that): layer 0 but for peaked light [1/sr], layer 1 peaked light over the peaked
+//! A texel holds radiance for a sun of irradiance 1, over the reach of its direction and times the scale of the eye (where `sky_coded`, a code of that): layer 0 but for peaked light [1/sr], layer 1 peaked light over the peaked
 //! phase function [1].
 #define_import_path veduta::atmosphere::sky_view
 
@@ -20,7 +20,10 @@ const DARKEST_SUN: f32 = -0.45;
 /// Where the sun's height differs less between directions than this, they are azimuths.
 const LEAST_SUNS: f32 = 1e-3;
 
-/// Light below which the codes of an eye above the air are linear.
+/// Share of the air's thickness above which a table holds codes.
+const CODED: f32 = 0.1;
+
+/// Light below which codes are linear.
 const DUSK: f32 = 5.9604645e-8;
 
 /// What the tables of one eye belong to.
@@ -41,6 +44,42 @@ struct SkyEye {
     sun_angular_radius: f32,
     /// 1 when the table of the sky shows the ground in directions below the horizon, else 0.
     shows_ground: u32,
+}
+
+/// What a picture needs of an eye within the air and its table of the sky: made once for all pixels.
+struct SkyLook {
+    /// Unit vector to the sun, y up at the eye.
+    to_sun: vec3<f32>,
+    /// Tangent of half the zenith angle of the horizon.
+    horizon: f32,
+    /// Azimuth of the sun times what the table's x falls by from the middle to the sun: half of what lies between its outermost columns; 0 for a sun in the zenith.
+    ahead: vec2<f32>,
+    /// Row of the table at the horizon, above it.
+    above: f32,
+    /// From there to the zenith.
+    above_rise: f32,
+    /// Row of the table at the horizon, below it.
+    below: f32,
+    /// From there to the nadir.
+    below_rise: f32,
+    /// What the table's values are multiplied with.
+    gain: f32,
+    /// 1 + g^2 of the peaked phase function.
+    peak_base: f32,
+    /// Its 2 g.
+    peak_slope: f32,
+    /// Its level [1/sr].
+    peak_level: f32,
+    /// Its coefficient of nu^2 [1/sr].
+    peak_square: f32,
+}
+
+/// Where a direction is in the table of an eye within the air.
+struct SkyTexel {
+    /// Column and row, in [0, 1].
+    at: vec2<f32>,
+    /// Cosine of the angle to the sun.
+    nu: f32,
 }
 
 /// A direction's place in the tables of an eye.
@@ -101,6 +140,75 @@ fn sky_place_shown(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
     let azimuth = clamp(dot(dir.xz, eye.to_sun.xz) * (over * flat), -1.0, 1.0);
     let y = sqrt(max(1.0 - min(ratio, 1.0 / ratio), 0.0));
     return SkyPlace(0.5 - 0.5 * azimuth, y, ratio > 1.0, dot(dir, eye.to_sun), 1.0);
+}
+
+/// Where a direction, a vector of any length, is in the table of an eye within the air.
+///
+/// domain  look.to_sun in [-1, 1] 1 lin
+/// domain  look.horizon in [1, 10] 1 log
+/// domain  look.ahead in [-0.5, 0.5] 1 lin
+/// domain  look.above in [0, 1] 1 lin
+/// domain  look.above_rise in [0, 1] 1 lin
+/// domain  look.below in [0, 1] 1 lin
+/// domain  look.below_rise in [0, 1] 1 lin
+/// domain  ray in [-1e3, 1e3] 1 lin
+/// range   [-2, 2] 1
+/// error   1e-3 abs of reference::air_tables::sky_texel
+/// outside undefined
+/// source  ours
+fn sky_texel(look: SkyLook, ray: vec3<f32>) -> SkyTexel {
+    // Zenith sine and 1 + cosine, times the ray's length; their quotient is the tangent of half the zenith angle. One division serves all.
+    let flat = max(dot(ray.xz, ray.xz), 1e-20);
+    let sine = sqrt(flat);
+    let length = sqrt(flat + ray.y * ray.y);
+    let rest = max((length + ray.y) * look.horizon, 1e-20);
+    let most = max(sine, rest);
+    let both = sine * length;
+    let over = 1.0 / (both * most);
+    let height = sqrt(max(1.0 - min(sine, rest) * (over * both), 0.0));
+    let row = select(look.above + look.above_rise * height, look.below + look.below_rise * height, sine > rest);
+    return SkyTexel(vec2<f32>(0.5 - dot(ray.xz, look.ahead) * (over * (length * most)), row), dot(ray, look.to_sun) * (over * (sine * most)));
+}
+
+/// Both parts of a table's light for a cosine `nu` of the angle to the sun.
+///
+/// internal
+fn sky_together(look: SkyLook, smooth_light: vec3<f32>, peaked: vec3<f32>, nu: f32) -> vec3<f32> {
+    let base = max(look.peak_base - look.peak_slope * nu, 1e-9);
+    let phase = (look.peak_level + look.peak_square * (nu * nu)) / (base * sqrt(base));
+    return (smooth_light + peaked * phase) * look.gain;
+}
+
+/// Radiance of the sky, or of the ground and the air before it, for a sun of irradiance 1 and without its disc, that an eye within the air sees along a vector of any length.
+///
+/// domain  look.to_sun in [-1, 1] 1 lin
+/// domain  ray in [-1e3, 1e3] 1 lin
+/// range   [0, 1e6] 1/sr
+/// error   0.02 rel of reference::sky::Sky::single_scatter
+/// source  Hillaire2020
+fn sky_seen(sky: texture_2d_array<f32>, linear: sampler, look: SkyLook, ray: vec3<f32>) -> vec3<f32> {
+    let texel = sky_texel(look, ray);
+    let smooth_light = textureSampleLevel(sky, linear, texel.at, 0, 0.0).rgb;
+    let peaked = textureSampleLevel(sky, linear, texel.at, 1, 0.0).rgb;
+    return sky_together(look, smooth_light, peaked, texel.nu);
+}
+
+/// As `sky_seen`, with one texture read a pixel: of two neighbours the left reads the one layer and the right the other, and each takes what it lacks from its neighbour. The
+/// phase function is each pixel's own, so that what is shared varies little. For fragments, in uniform control flow; `pixel` is the place in the target.
+///
+/// domain  look.to_sun in [-1, 1] 1 lin
+/// domain  ray in [-1e3, 1e3] 1 lin
+/// domain  pixel in [0, 16384] 1 lin
+/// range   [0, 1e6] 1/sr
+/// error   0.02 rel of reference::sky::Sky::single_scatter
+/// source  Hillaire2020; shared reads: ours
+fn sky_seen_by_pair(sky: texture_2d_array<f32>, linear: sampler, look: SkyLook, ray: vec3<f32>, pixel: vec2<f32>) -> vec3<f32> {
+    let texel = sky_texel(look, ray);
+    let right = i32(pixel.x) & 1;
+    let own = textureSampleLevel(sky, linear, texel.at, right, 0.0).rgb;
+    let step = dpdxFine(own);
+    let other = select(own - step, own + step, right == 0);
+    return sky_together(look, select(other, own, right == 0), select(own, other, right == 0), texel.nu);
 }
 
 /// Place of a unit vector `dir` in the tables of an eye within the air.
@@ -227,7 +335,7 @@ fn sky_direction(eye: SkyEye, place: vec2<f32>, below: bool) -> vec3<f32> {
 /// error   0 abs of reference::air_tables::sky_rows
 /// source  ours
 fn sky_rows(eye: SkyEye, rows: f32) -> f32 {
-    return floor(rows * select(0.75, 0.33333333, eye.altitude > eye.top));
+    return floor(rows * select(0.75, 0.5, eye.altitude > eye.top));
 }
 
 /// Row of the table of the sky, in [0, 1], of a height above or depth below the horizon in [0, 1]; the parts never mix.
@@ -246,7 +354,19 @@ fn sky_row(eye: SkyEye, y: f32, below: bool, rows: f32) -> f32 {
     return (first + min(y, 1.0) * (count - 1.0) + 0.5) / rows;
 }
 
-/// What the table of the sky holds for an eye above the air: a logarithm, because such an eye sees noon and night at once.
+/// Whether the table of the sky holds codes: for an eye so high that the air below it thins out along its limb by more than a line between texels can follow, or that sees
+/// noon and night at once.
+///
+/// domain  eye.altitude in [0, 1e8] m lin
+/// domain  eye.top in [5e4, 2e5] m lin
+/// range   [0, 1] 1
+/// error   0 abs of reference::air_tables::sky_coded
+/// source  ours
+fn sky_coded(eye: SkyEye) -> bool {
+    return eye.altitude > CODED * eye.top;
+}
+
+/// What such a table holds: a logarithm.
 ///
 /// domain  light in [0, 100] 1 lin
 /// range   [-24, 7] 1
@@ -268,7 +388,7 @@ fn decode_dusk(code: vec3<f32>) -> vec3<f32> {
     return max(exp2(code) - DUSK, vec3<f32>(0.0));
 }
 
-/// Radiance of the sky, or of the air before the ground, for a sun of irradiance 1 and without its disc, read from the table; `outside` says whether the eye is above the air.
+/// Radiance of the sky, or of the air before the ground, for a sun of irradiance 1 and without its disc, read from the table; `coded` is that of the eye.
 ///
 /// domain  place.x in [0, 1] 1 lin
 /// domain  place.y in [0, 1] 1 lin
@@ -277,13 +397,13 @@ fn decode_dusk(code: vec3<f32>) -> vec3<f32> {
 /// range   [0, 1e6] 1/sr
 /// error   0.02 rel of reference::sky::Sky::single_scatter
 /// source  Hillaire2020
-fn sky_radiance(sky: texture_2d_array<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace, outside: bool) -> vec3<f32> {
+fn sky_radiance(sky: texture_2d_array<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace, coded: bool) -> vec3<f32> {
     let size = vec2<f32>(textureDimensions(sky));
     let at = vec2<f32>((place.x * (size.x - 1.0) + 0.5) / size.x, sky_row(eye, place.y, place.below, size.y));
     let smooth_light = textureSampleLevel(sky, linear, at, 0, 0.0).rgb;
     let peaked = textureSampleLevel(sky, linear, at, 1, 0.0).rgb;
     let factor = place.reach / eye.scale;
-    if outside {
+    if coded {
         return (decode_dusk(smooth_light) + decode_dusk(peaked) * peak_phase(air, place.nu)) * factor;
     }
     return (smooth_light + peaked * peak_phase(air, place.nu)) * factor;

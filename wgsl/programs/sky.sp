@@ -8,7 +8,7 @@ nothing stands, and with SUN_DISC a square about the sun's disc; with AERIAL a p
 struct Corner {
     @builtin(position) position: vec4<f32>,
     // The ray through the pixel, at the depth 1; for parallel rays the place in the plane of the eye [m].
-    @location(0) ray: vec3<f32>,
+    @location(0) @interpolate(linear) ray: vec3<f32>,
 }
 
 struct SkyDraw {
@@ -79,15 +79,19 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #FRAGMENT{
     #CODE{
 #import veduta::atmosphere::medium::{Air}
-#import veduta::atmosphere::sky_view::{SkyEye, SkyPlace, sky_place_shown, sky_place_outside, sky_radiance}
+#import veduta::atmosphere::sky_view::{SkyEye, SkyPlace, SkyLook, sky_place_shown, sky_place_outside, sky_radiance, sky_seen}
+#ifndef AERIAL
+#import veduta::atmosphere::sky_view::{sky_seen_by_pair}
+#endif
 #ifdef AERIAL
 #import veduta::atmosphere::ray::{AirLight, air_ray}
-#import veduta::atmosphere::aerial::{aerial_light, aerial_depth}
+#import veduta::atmosphere::aerial::{aerial_light}
+#import veduta::atmosphere::columns::{sun_depth}
 #import veduta::atmosphere::sun_disc::{sun_disc}
 #else
 #ifdef SUN_DISC
 #import veduta::atmosphere::ray::{air_ray}
-#import veduta::atmosphere::aerial::{aerial_depth}
+#import veduta::atmosphere::columns::{sun_depth}
 #import veduta::atmosphere::sun_disc::{sun_disc}
 #endif
 #endif
@@ -99,10 +103,12 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
     #CODE{
 @group(0) @binding(0) var<uniform> air: Air;
 @group(0) @binding(1) var<uniform> eye: SkyEye;
+@group(0) @binding(3) var<uniform> look: SkyLook;
 @group(1) @binding(0) var linear: sampler;
 @group(1) @binding(1) var sky: texture_2d_array<f32>;
 @group(1) @binding(2) var light: texture_2d_array<f32>;
 @group(1) @binding(3) var depths: texture_2d<f32>;
+@group(1) @binding(4) var columns: texture_2d_array<f32>;
 #ifdef AERIAL
 @group(2) @binding(0) var depth: texture_depth_2d;
 #ifndef AERIAL_TARGETS
@@ -112,19 +118,22 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 
 override OUTPUT: i32 = 0;
 
-// Whether the eye is above the air.
-override EYE_OUTSIDE: i32 = 0;
+// Where the eye is: 0 low in the air, 1 so high that its table holds codes, 2 above the air.
+override EYE_PLACE: i32 = 0;
 
 fn place_of(dir: vec3<f32>) -> SkyPlace {
-    if EYE_OUTSIDE != 0 {
+    if EYE_PLACE == 2 {
         return sky_place_outside(eye, dir);
     }
     return sky_place_shown(eye, dir);
 }
 
 // Behind the host's things: the sky, or the bare ground and the air before it.
-fn background(dir: vec3<f32>) -> vec3<f32> {
-    return sky_radiance(sky, linear, air, eye, place_of(dir), EYE_OUTSIDE != 0);
+fn background(ray: vec3<f32>) -> vec3<f32> {
+    if EYE_PLACE != 0 {
+        return sky_radiance(sky, linear, air, eye, place_of(normalize(ray)), true);
+    }
+    return sky_seen(sky, linear, look, ray);
 }
 
 #ifdef AERIAL
@@ -133,7 +142,8 @@ fn disc(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
     let place = place_of(dir);
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
     let seen = select(1.0, 0.0, place.below || draw_view.parallel != 0u) * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle);
-    return seen * exp(-aerial_depth(depths, linear, air, eye, place, ray.length, ray.length));
+    let left = exp(-sun_depth(columns, linear, air, ray.altitude, ray.mu));
+    return seen * select(vec3<f32>(1.0), left, ray.length > 0.0);
 }
 #else
 #ifdef SUN_DISC
@@ -142,7 +152,8 @@ fn disc(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
     let place = place_of(dir);
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
     let seen = select(1.0, 0.0, place.below) * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle);
-    return seen * exp(-aerial_depth(depths, linear, air, eye, place, ray.length, ray.length));
+    let left = exp(-sun_depth(columns, linear, air, ray.altitude, ray.mu));
+    return seen * select(vec3<f32>(1.0), left, ray.length > 0.0);
 }
 #endif
 #endif
@@ -150,7 +161,7 @@ fn disc(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
 #ifdef AERIAL
 // Whether there is no air in a direction.
 fn misses(dir: vec3<f32>) -> bool {
-    return EYE_OUTSIDE != 0 && place_of(dir).y > 1.0;
+    return EYE_PLACE == 2 && place_of(dir).y > 1.0;
 }
 
 // Light and transmittance before what stands at a depth of the host's depth buffer.
@@ -226,11 +237,17 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
 #else
 @fragment
 fn draw(in: Corner) -> @location(0) vec4<f32> {
-    let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
+    let ray = select(in.ray, draw_view.forward, draw_view.parallel != 0u);
 #ifdef SUN_DISC
+    let dir = normalize(ray);
     let radiance = background(dir) + disc(dir, length(dpdx(dir)));
 #else
-    let radiance = background(dir);
+    var radiance = vec3<f32>(0.0);
+    if EYE_PLACE != 0 {
+        radiance = background(ray);
+    } else {
+        radiance = sky_seen_by_pair(sky, linear, look, ray, in.position.xy);
+    }
 #endif
     return shown(radiance * draw_view.sun_irradiance, in.position.xy);
 }

@@ -6,7 +6,7 @@ Light along given rays of one eye, read from its tables. Nothing is drawn.
     #CODE{
 #import veduta::atmosphere::medium::{Air}
 #import veduta::atmosphere::ray::{air_ray}
-#import veduta::atmosphere::sky_view::{SkyEye, sky_place, sky_radiance}
+#import veduta::atmosphere::sky_view::{SkyEye, sky_coded, sky_place, sky_radiance}
 #import veduta::atmosphere::aerial::{aerial_light}
 #import veduta::atmosphere::columns::{sun_depth}
 #import veduta::atmosphere::scatter::{scatter_along, scattered_radiance}
@@ -59,7 +59,7 @@ fn probe(@builtin(global_invocation_id) id: vec3<u32>) {
         if ray.meets_ground == 0u {
             found.transmittance = exp(-sun_depth(columns, linear, air, ray.altitude, ray.mu));
         }
-        found.in_scatter = sky_radiance(sky, linear, air, eye, place, eye.altitude > eye.top);
+        found.in_scatter = sky_radiance(sky, linear, air, eye, place, sky_coded(eye));
     }
     results[id.x] = ProbeLight(found.in_scatter, found.transmittance);
 }

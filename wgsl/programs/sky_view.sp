@@ -9,7 +9,7 @@ The table of the sky as one eye sees it: every direction that leaves the air. Ma
 #import veduta::atmosphere::columns::{texel_coordinates, sun_depth, sun_above_horizon}
 #import veduta::atmosphere::diffuse::{diffuse_moments, level_irradiance}
 #import veduta::atmosphere::scatter::{scatter_along}
-#import veduta::atmosphere::sky_view::{SkyEye, encode_dusk, sky_direction, sky_place, sky_rows}
+#import veduta::atmosphere::sky_view::{SkyEye, encode_dusk, sky_coded, sky_direction, sky_place, sky_rows}
 
 override SKY_STEPS: i32 = 12;
 override ALL_ORDERS: i32 = 1;
@@ -45,7 +45,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     let factor = eye.scale / max(sky_place(eye, dir).reach, 1e-9);
     var smooth_light = light.smooth_light * factor;
     var peaked_light = light.peaked_light * factor;
-    if eye.altitude > eye.top {
+    if sky_coded(eye) {
         smooth_light = encode_dusk(smooth_light);
         peaked_light = encode_dusk(peaked_light);
     }

@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use serde_json::json;
 use veduta::atmosphere::{
-    Atmosphere, FastProbe, Orders, Probe, ProbeLight, ProbeOptions, ProbeRay, Sky, SkyOptions,
-    SkyQuality,
+    Atmosphere, Eye, FastProbe, Orders, Probe, ProbeLight, ProbeOptions, ProbeRay, Sky, SkyOptions,
+    SkyQuality, SkyTables,
 };
 use veduta::program::Value;
 use veduta::reference::monte_carlo::Random;
@@ -146,12 +146,15 @@ fn errors(found: &[ProbeLight], truth: &[[f64; 3]]) -> Errors {
 }
 
 struct Subject {
+    /// Every table there is, the air before things too.
+    tables: SkyTables,
     sky: Sky,
     view: View,
     turn: u32,
 }
 
 impl Subject {
+    /// Draws, or makes the tables.
     fn frame(
         &mut self,
         bench: &Bench,
@@ -160,8 +163,17 @@ impl Subject {
         let gpu = &bench.gpu;
         spent(|| {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            let _ = self.sky.prepare(&gpu.queue, &mut encoder, &self.view)?;
+            let sun = &self.view.sun;
+            let eye = Eye {
+                altitude: self.view.eye.altitude(),
+                to_sun: sun.to_light.as_dvec3().normalize().to_array(),
+                sun_angular_radius: f64::from(sun.angular_radius),
+            };
+            if target.is_none() {
+                let _ = self.tables.prepare(&gpu.queue, &mut encoder, &eye)?;
+            }
             if let Some(view) = target {
+                let _ = self.sky.prepare(&gpu.queue, &mut encoder, &self.view)?;
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                         view,
@@ -187,9 +199,9 @@ impl Subject {
         let sun = direction((20.0 + 0.1 * step).to_radians(), 0.3);
         self.view.sun.to_light = sun.as_vec3();
         let moved = self.frame(bench, None)?;
-        let mut air = self.sky.tables().atmosphere().clone();
+        let mut air = self.tables.atmosphere().clone();
         air.thickness = 1e5 + 1.0 + step;
-        self.sky.tables_mut().set_atmosphere(&air)?;
+        self.tables.set_atmosphere(&air)?;
         let all = self.frame(bench, None)?;
         // The first draw after other work warms the caches.
         self.frame(bench, Some(target))?;
@@ -279,6 +291,7 @@ pub fn run(
             ..Default::default()
         };
         subjects.push(Subject {
+            tables: SkyTables::with_ground(&gpu.device, programs, &air, &quality(preset)?)?,
             sky: Sky::new(&gpu.device, programs, &targets, &options)?,
             view,
             turn: 0,
@@ -332,7 +345,7 @@ pub fn run(
         march_errors,
         bytes: subjects
             .iter()
-            .map(|s| s.sky.resources().texture_bytes)
+            .map(|s| s.tables.resources().texture_bytes)
             .collect(),
     })
 }

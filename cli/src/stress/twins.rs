@@ -1,7 +1,9 @@
 //! Every public function's f64 twin, called with the bits of a row, and what is particular about its arguments.
 
 use veduta::reference::air_ray::{self, AirRay};
-use veduta::reference::air_tables::{self, Moments, Scattered, SkyEye, SkyPlace, SplitPhases};
+use veduta::reference::air_tables::{
+    self, Moments, Scattered, SkyEye, SkyLook, SkyPlace, SkyTexel, SplitPhases,
+};
 use veduta::reference::atmosphere::{Atmosphere, SkyLight};
 use veduta::reference::clouds::{CloudLayer, CloudLight};
 use veduta::reference::fractal::warp;
@@ -72,6 +74,14 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
     (
         "veduta::atmosphere::sky_view::sky_radiance",
         "single_scattering_from_tables_meets_quadrature",
+    ),
+    (
+        "veduta::atmosphere::sky_view::sky_seen",
+        "what_the_sky_draws_is_what_the_probe_finds",
+    ),
+    (
+        "veduta::atmosphere::sky_view::sky_seen_by_pair",
+        "what_the_sky_draws_is_what_the_probe_finds",
     ),
     (
         "veduta::atmosphere::aerial::aerial_depth",
@@ -235,6 +245,20 @@ argument!(Scattered {
     peaked_light: [f64; 3],
     transmittance: [f64; 3]
 });
+argument!(SkyLook {
+    to_sun: [f64; 3],
+    horizon: f64,
+    ahead: [f64; 2],
+    above: f64,
+    above_rise: f64,
+    below: f64,
+    below_rise: f64,
+    gain: f64,
+    peak_base: f64,
+    peak_slope: f64,
+    peak_level: f64,
+    peak_square: f64
+});
 argument!(SkyEye {
     to_sun: [f64; 3],
     altitude: f64,
@@ -321,6 +345,12 @@ impl Answer for SkyPlace {
     fn values(self) -> Values {
         let below = f64::from(u8::from(self.below));
         Values::new(&[self.x, self.y, below, self.nu, self.reach])
+    }
+}
+
+impl Answer for SkyTexel {
+    fn values(self) -> Values {
+        Values::new(&[self.at[0], self.at[1], self.nu])
     }
 }
 
@@ -1305,6 +1335,8 @@ pub fn registry() -> Vec<Entry> {
         sky_place,
         sky_place_inside,
         sky_place_outside,
+        sky_texel,
+        sky_coded,
         encode_dusk,
         decode_dusk,
         sky_direction,
@@ -1703,7 +1735,14 @@ fn particular(entry: Entry) -> Entry {
                 _ => entry,
             }
         }
+        ("atmosphere::sky_view", "sky_texel") => entry.unit("look.to_sun").unit("ray").jumps(
+            "directions along the horizon, and those without an azimuth",
+            1e-6,
+        ),
         ("atmosphere::sky_view", "encode_dusk" | "decode_dusk") => entry,
+        ("atmosphere::sky_view", "sky_coded") => {
+            entry.eye().jumps("the altitude of the change", 1e-6)
+        }
         ("atmosphere::sky_view", "sky_direction") => entry.eye().jumps("a sun in the zenith", 1e-6),
         ("atmosphere::sky_view", _) => {
             let mut entry = entry.eye();
