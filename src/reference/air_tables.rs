@@ -402,14 +402,34 @@ fn reach(eye: &SkyEye, dir: [f64; 3], below: bool) -> f64 {
     air_ray::air_ray(radius, top, eye.altitude, dir, eye.to_sun, infinity).length / top
 }
 
+const LIMB_BEND: f64 = 0.015;
+
+fn bend_limb(share: f64, bend: f64) -> f64 {
+    (share / bend).ln_1p() / bend.recip().ln_1p()
+}
+
+fn unbend_limb(y: f64, bend: f64) -> f64 {
+    bend * (y * bend.recip().ln_1p()).exp_m1()
+}
+
+fn inner_bend(eye: &SkyEye) -> f64 {
+    let horizon = (eye.altitude * (2.0 * eye.ground_radius + eye.altitude)).max(1.0);
+    LIMB_BEND * eye.top / horizon.sqrt()
+}
+
 /// Place of a direction in the tables of an eye within the air.
 pub fn sky_place_inside(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
     // The tangent of half the zenith angle, over that of the horizon.
     let half = 0.5 * dir[0].hypot(dir[2]).max(1e-10).atan2(dir[1]);
     let ratio = half.tan() / eye.horizon;
+    let share = (1.0 - ratio.min(1.0 / ratio)).max(0.0);
     SkyPlace {
         x: 0.5 * (1.0 - azimuth_cosine(&eye, dir)),
-        y: (1.0 - ratio.min(1.0 / ratio)).max(0.0).sqrt(),
+        y: if sky_coded(eye) != 0.0 && ratio <= 1.0 {
+            bend_limb(share, inner_bend(&eye))
+        } else {
+            share.sqrt()
+        },
         below: ratio > 1.0,
         nu: dot(dir, eye.to_sun),
         reach: if eye.shows_ground != 0 {
@@ -518,11 +538,13 @@ pub fn sky_place_outside(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
     let [cosine, sine] = air_ray::zenith_parts(dir);
     let zenith = sine.atan2(cosine);
     let y = if below {
-        1.0 - (0.5 * (PI - zenith)).tan() * eye.horizon
+        (1.0 - (0.5 * (PI - zenith)).tan() * eye.horizon)
+            .max(0.0)
+            .sqrt()
     } else if dir[1] < 0.0 && lowest <= eye.top {
-        1.0 - (1.0 - lowest / eye.top).sqrt()
+        bend_limb(lowest / eye.top, LIMB_BEND)
     } else {
-        4.0
+        2.0
     };
     let suns = seen_suns(&eye, zenith, lowest);
     let ends = sun_ends(suns);
@@ -534,7 +556,7 @@ pub fn sky_place_outside(eye: SkyEye, dir: [f64; 3]) -> SkyPlace {
     };
     SkyPlace {
         x: x.clamp(0.0, 1.0),
-        y: y.clamp(0.0, 4.0).sqrt(),
+        y: y.clamp(0.0, 2.0),
         below,
         nu: dot(dir, eye.to_sun),
         reach: if y > 1.0 {
@@ -561,10 +583,12 @@ pub fn sky_direction(eye: SkyEye, place: [f64; 2], below: bool) -> [f64; 3] {
     let r = eye.ground_radius + eye.altitude;
     let above = eye.altitude > eye.top;
     let zenith = if above && !below {
-        let lowest = eye.top * (1.0 - ratio * ratio);
+        let lowest = eye.top * unbend_limb(y, LIMB_BEND).min(0.9999);
         PI - ((eye.ground_radius + lowest) / r).min(1.0).asin()
     } else if below {
         PI - 2.0 * (ratio / eye.horizon).atan()
+    } else if sky_coded(eye) != 0.0 {
+        2.0 * ((1.0 - unbend_limb(y, inner_bend(&eye))) * eye.horizon).atan()
     } else {
         2.0 * (ratio * eye.horizon).atan()
     };
@@ -575,7 +599,7 @@ pub fn sky_direction(eye: SkyEye, place: [f64; 2], below: bool) -> [f64; 3] {
             let horizon = 2.0 * (1.0 / eye.horizon).atan();
             eye.ground_radius * (zenith.sin() / horizon.sin() - 1.0)
         } else {
-            eye.top * (1.0 - ratio * ratio)
+            eye.top * unbend_limb(y, LIMB_BEND).min(0.9999)
         };
         let suns = seen_suns(&eye, zenith, lowest);
         let ends = sun_ends(suns);
@@ -616,7 +640,7 @@ pub fn decode_dusk(code: [f64; 3]) -> [f64; 3] {
 
 /// Rows of the table of the sky above the horizon.
 pub fn sky_rows(eye: SkyEye, rows: f64) -> f64 {
-    if eye.altitude > eye.top {
+    if sky_coded(eye) != 0.0 {
         (0.5 * rows).floor()
     } else {
         (0.75 * rows).floor()

@@ -484,8 +484,8 @@ fn crossing_the_top_of_the_air_changes_no_pixel() {
         println!(
             "pitch {pitch}, sun {sun:?}: 2 m {metre:.5}, 200 m {across:.5}, beside {beside:.5}"
         );
-        // Row A12 wants 0.01, which one pixel of the limb misses: the table within the air has few rows for the limb.
-        assert!(metre < 0.06 && across < 0.01 + beside);
+        // Row A12 wants 0.01, which a pixel at the horizon misses: the limb has other rows within the air than above it.
+        assert!(metre < 0.03 && across < 0.01 + beside);
     }
 }
 

@@ -2,7 +2,7 @@
 //! source   Hillaire2020 (a table per eye); half-angle tangents, exact horizon, cosine of the azimuth: ours
 //! symbols  mu zenith cosine · x, y coordinates in [0, 1]: azimuth from the sun, and height above the horizon
 //!
-//! The first rows hold directions above the horizon, the others those below: of an eye within the air the last quarter, of an eye above it half.
+//! The first rows hold directions above the horizon, the others those below: the last quarter, or half where `sky_coded`.
 //!
 //! A texel holds radiance for a sun of irradiance 1, over the reach of its direction and times the scale of the eye (where `sky_coded`, a code of that): layer 0 but for peaked light [1/sr], layer 1 peaked light over the peaked
 //! phase function [1].
@@ -22,6 +22,9 @@ const LEAST_SUNS: f32 = 1e-3;
 
 /// Share of the air's thickness above which a table holds codes.
 const CODED: f32 = 0.1;
+
+/// How low a limb begins to be less dense than at the ground, over the air's thickness.
+const LIMB_BEND: f32 = 0.015;
 
 /// Light below which codes are linear.
 const DUSK: f32 = 5.9604645e-8;
@@ -97,6 +100,27 @@ struct SkyPlace {
     reach: f32,
 }
 
+/// A share of what is above the horizon, bent so that rows are dense where the air is: 0 at the horizon, 1 at the end.
+///
+/// internal
+fn bend_limb(share: f32, bend: f32) -> f32 {
+    return log(1.0 + share / bend) / log(1.0 + 1.0 / bend);
+}
+
+/// The inverse of `bend_limb`.
+///
+/// internal
+fn unbend_limb(y: f32, bend: f32) -> f32 {
+    return bend * (exp(y * log(1.0 + 1.0 / bend)) - 1.0);
+}
+
+/// The bend of an eye within the air: rays that run so much above the horizon run as low as LIMB_BEND says.
+///
+/// internal
+fn inner_bend(eye: SkyEye) -> f32 {
+    return LIMB_BEND * eye.top * inverseSqrt(max(eye.altitude * (2.0 * eye.ground_radius + eye.altitude), 1.0));
+}
+
 /// Bends a zenith cosine of the sun, so that coordinates are dense at the terminator.
 ///
 /// internal
@@ -138,8 +162,12 @@ fn sky_place_shown(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
     let ratio = max(aside, 1e-20) * over / max((1.0 + dir.y) * eye.horizon, 1e-20);
     let flat = inverseSqrt(max(dot(eye.to_sun.xz, eye.to_sun.xz), 1e-20));
     let azimuth = clamp(dot(dir.xz, eye.to_sun.xz) * (over * flat), -1.0, 1.0);
-    let y = sqrt(max(1.0 - min(ratio, 1.0 / ratio), 0.0));
-    return SkyPlace(0.5 - 0.5 * azimuth, y, ratio > 1.0, dot(dir, eye.to_sun), 1.0);
+    let share = max(1.0 - min(ratio, 1.0 / ratio), 0.0);
+    var y = sqrt(share);
+    if sky_coded(eye) && ratio <= 1.0 {
+        y = bend_limb(share, inner_bend(eye));
+    }
+    return SkyPlace(0.5 - 0.5 * azimuth, y, ratio > 1.0, clamp(dot(dir, eye.to_sun), -1.0, 1.0), 1.0);
 }
 
 /// Where a direction, a vector of any length, is in the table of an eye within the air.
@@ -241,7 +269,7 @@ fn sky_place_inside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
 /// domain  eye.altitude in [1e5, 1e8] m log
 /// domain  dir in [-1, 1] 1 lin
 /// range   [-1, 2] 1
-/// error   1e-3 abs of reference::air_tables::sky_place_outside
+/// error   4e-3 abs of reference::air_tables::sky_place_outside
 /// outside undefined
 /// source  ours
 fn sky_place_outside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
@@ -249,8 +277,8 @@ fn sky_place_outside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
     let nadir = length(dir.xz) / (1.0 - dir.y) * eye.horizon;
     let below = lowest < 0.0 && dir.y < 0.0;
     let share = lowest / eye.top;
-    let limb = select(4.0, share / (1.0 + sqrt(max(1.0 - share, 0.0))), dir.y < 0.0 && share <= 1.0);
-    let y = select(limb, 1.0 - nadir, below);
+    let limb = select(2.0, bend_limb(max(share, 0.0), LIMB_BEND), dir.y < 0.0 && share <= 1.0);
+    let y = select(limb, sqrt(max(1.0 - nadir, 0.0)), below);
     let sine = length(dir.xz);
     let suns = seen_suns(eye, sine, dir.y, lowest);
     let ends = sun_ends(suns);
@@ -264,7 +292,7 @@ fn sky_place_outside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
     let half_ground = sqrt(max(-lowest * (2.0 * eye.ground_radius + lowest), 0.0));
     let globe = select((2.0 * eye.ground_radius + eye.top) / (half_top + half_ground), 1.0, eye.shows_ground != 0u);
     let reach = select(select(2.0 * half_top / eye.top, 0.0, limb > 1.0), globe, below);
-    return SkyPlace(clamp(x, 0.0, 1.0), sqrt(clamp(y, 0.0, 4.0)), below, dot(dir, eye.to_sun), reach);
+    return SkyPlace(clamp(x, 0.0, 1.0), clamp(y, 0.0, 2.0), below, clamp(dot(dir, eye.to_sun), -1.0, 1.0), reach);
 }
 
 /// Place of a unit vector `dir` in the tables of an eye.
@@ -273,7 +301,7 @@ fn sky_place_outside(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
 /// domain  eye.altitude in [0, 1e8] m lin
 /// domain  dir in [-1, 1] 1 lin
 /// range   [-1, 2] 1
-/// error   1e-3 abs of reference::air_tables::sky_place
+/// error   4e-3 abs of reference::air_tables::sky_place
 /// outside undefined
 /// source  ours
 fn sky_place(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
@@ -296,13 +324,17 @@ fn sky_place(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
 fn sky_direction(eye: SkyEye, place: vec2<f32>, below: bool) -> vec3<f32> {
     // The horizon itself belongs to neither side: keep off it by more than rounding.
     let y = max(place.y, 4e-3);
-    let ratio = 1.0 - y * y;
+    var ratio = 1.0 - y * y;
+    if sky_coded(eye) && !below {
+        ratio = 1.0 - unbend_limb(y, inner_bend(eye));
+    }
     var sine = 0.0;
     var mu = 0.0;
     var azimuth = clamp(1.0 - 2.0 * place.x, -1.0, 1.0);
     var lowest = 0.0;
     if eye.altitude > eye.top && !below {
-        lowest = eye.top * (y * y) * (2.0 - y * y);
+        // Nor is there light at the top itself.
+        lowest = eye.top * min(unbend_limb(y, LIMB_BEND), 0.9999);
         sine = (eye.ground_radius + lowest) / (eye.ground_radius + eye.altitude);
         mu = -sqrt(max((eye.altitude - lowest) * (2.0 * eye.ground_radius + eye.altitude + lowest), 0.0)) / (eye.ground_radius + eye.altitude);
     } else {
@@ -335,7 +367,7 @@ fn sky_direction(eye: SkyEye, place: vec2<f32>, below: bool) -> vec3<f32> {
 /// error   0 abs of reference::air_tables::sky_rows
 /// source  ours
 fn sky_rows(eye: SkyEye, rows: f32) -> f32 {
-    return floor(rows * select(0.75, 0.5, eye.altitude > eye.top));
+    return floor(rows * select(0.75, 0.5, sky_coded(eye)));
 }
 
 /// Row of the table of the sky, in [0, 1], of a height above or depth below the horizon in [0, 1]; the parts never mix.
