@@ -44,6 +44,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             &["SUN_DISC"],
             &["AERIAL"],
             &["AERIAL", "AERIAL_TARGETS"],
+            &["AERIAL", "AERIAL_ALPHA"],
         ],
         "air_columns" | "air_diffuse" | "sky_view" | "sky_aerial" | "sky_probe" | "sky_query"
         | "probe" => &[&[]],

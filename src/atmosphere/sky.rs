@@ -21,6 +21,9 @@ pub enum SkyComposition {
     Background,
     /// Sky and air in a pass of their own that reads the host's picture (scene radiance) and depth and writes the whole target.
     OverPicture,
+    /// As `OverPicture`, but depth stands in the picture's alpha, as [`Sky::set_host_with_alpha`] says: one target carries colour and linear
+    /// depth.
+    OverPictureWithAlpha,
     /// As `OverPicture`, but light and transmittance go into two targets of float formats, for a host that puts them together itself:
     /// picture * transmittance + light. The picture is not read.
     TwoTargets,
@@ -84,6 +87,8 @@ pub struct Sky {
     place: EyePlace,
     draw: wgpu::Buffer,
     draw_bytes: Vec<u8>,
+    /// What linear depth in the picture's alpha is divided by.
+    greatest_depth: f32,
     host: Option<wgpu::BindGroup>,
 }
 
@@ -252,6 +257,7 @@ impl Sky {
         match options.composition {
             SkyComposition::Background => {}
             SkyComposition::OverPicture => features.push("AERIAL"),
+            SkyComposition::OverPictureWithAlpha => features.extend(["AERIAL", "AERIAL_ALPHA"]),
             SkyComposition::TwoTargets => features.extend(["AERIAL", "AERIAL_TARGETS"]),
         }
         let draw = device.create_buffer(&wgpu::BufferDescriptor {
@@ -302,6 +308,7 @@ impl Sky {
             place: EyePlace::Low,
             draw,
             draw_bytes: Vec::new(),
+            greatest_depth: 0.0,
             host: None,
         };
         sky.pass(EyePlace::Low)?;
@@ -360,36 +367,71 @@ impl Sky {
         depth: &wgpu::TextureView,
         picture: Option<&wgpu::TextureView>,
     ) -> Result<(), Error> {
-        let fault = |name: &str, value: &str, domain: &str| {
-            Err(Error::OutOfDomain {
-                name: name.to_owned(),
-                value: value.to_owned(),
-                domain: domain.to_owned(),
-            })
-        };
         let mut bound = vec![(0, wgpu::BindingResource::TextureView(depth))];
         match (self.composition, picture) {
-            (SkyComposition::Background, _) => {
-                return fault(
+            (SkyComposition::Background | SkyComposition::OverPictureWithAlpha, _) => {
+                return Err(fault(
                     "composition",
-                    "Background",
-                    "one that reads the host's depth",
-                );
+                    format!("{:?}", self.composition),
+                    "one that reads the host's depth buffer",
+                ));
             }
             (SkyComposition::OverPicture, None) => {
-                return fault("picture", "missing", "the host's scene radiance");
+                return Err(fault(
+                    "picture",
+                    "missing".to_owned(),
+                    "the host's scene radiance",
+                ));
             }
             (SkyComposition::OverPicture, Some(picture)) => {
                 bound.push((1, wgpu::BindingResource::TextureView(picture)));
             }
             (SkyComposition::TwoTargets, _) => {}
         }
+        self.bind_host(device, &bound)
+    }
+
+    /// As [`Sky::set_host`] for `OverPictureWithAlpha`: a picture of scene radiance whose alpha is the depth along the view's direction over
+    /// `greatest_depth` in metres, in [1, 1e12]; where it is 1 or more there is sky. A 32-bit format keeps millimetres near the eye; `Rgba16Float` a
+    /// thousandth of the depth.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for a sky of another composition and for a depth out of its domain.
+    pub fn set_host_with_alpha(
+        &mut self,
+        device: &wgpu::Device,
+        picture: &wgpu::TextureView,
+        greatest_depth: f32,
+    ) -> Result<(), Error> {
+        if self.composition != SkyComposition::OverPictureWithAlpha {
+            return Err(fault(
+                "composition",
+                format!("{:?}", self.composition),
+                "OverPictureWithAlpha",
+            ));
+        }
+        if !(1.0..=1e12).contains(&greatest_depth) {
+            return Err(fault(
+                "greatest_depth",
+                greatest_depth.to_string(),
+                "in [1, 1e12] m",
+            ));
+        }
+        self.greatest_depth = greatest_depth;
+        self.bind_host(device, &[(1, wgpu::BindingResource::TextureView(picture))])
+    }
+
+    fn bind_host(
+        &mut self,
+        device: &wgpu::Device,
+        bound: &[(u32, wgpu::BindingResource<'_>)],
+    ) -> Result<(), Error> {
         let layouts = &self.pass(self.place)?.sky.layouts;
         self.host = bind_groups(
             device,
             "veduta host",
             layouts.get(2..).unwrap_or_default(),
-            &[&bound],
+            &[bound],
         )
         .pop();
         Ok(())
@@ -413,8 +455,13 @@ impl Sky {
             sun_angular_radius: f64::from(view.sun.angular_radius),
         };
         let colour = self.tables.atmosphere().sun.colour;
-        let reads_depth = self.composition != SkyComposition::Background;
-        let block = draw_block(&self.targets, reads_depth, colour, view)?;
+        // Depth in a picture's alpha has no direction.
+        let reads_depth = matches!(
+            self.composition,
+            SkyComposition::OverPicture | SkyComposition::TwoTargets
+        );
+        let mut block = draw_block(&self.targets, reads_depth, colour, view)?;
+        block.greatest_depth = self.greatest_depth;
         let mut work = self.tables.prepare(queue, encoder, &eye)?;
         let altitude = eye.altitude as f32;
         let top = self.tables.atmosphere().thickness as f32;
@@ -466,6 +513,14 @@ impl Sky {
             work.draws += 1;
         }
         Ok(work)
+    }
+}
+
+fn fault(name: &str, value: String, domain: &str) -> Error {
+    Error::OutOfDomain {
+        name: name.to_owned(),
+        value,
+        domain: domain.to_owned(),
     }
 }
 
@@ -524,6 +579,7 @@ fn draw_block(
         exposure: view.exposure,
         sun_irradiance: (view.sun.irradiance * colour).to_array(),
         parallel: u32::from(parallel),
+        ..DrawBlock::ZERO
     })
 }
 

@@ -1,4 +1,4 @@
-//! The sky behind a host's scene and the air before it (rows A12 to A15, A18 and A19; A14 is not covered; for A16 see `tone_map`).
+//! The sky behind a host's scene and the air before it (rows A12 to A15, A18 and A19; for A16 see `tone_map`).
 
 use veduta::atmosphere::{
     Eye, FastProbe, LightPlace, ProbeLight, ProbeRay, Sky, SkyComposition, SkyOptions, SkyQuality,
@@ -351,6 +351,28 @@ fn air_before_things_is_that_of_the_probe_with_every_depth() {
             .unwrap();
         let shown = shoot(&mut over, &view);
         assert_eq!(shown.not_finite(), 0);
+
+        // The same with the depth in the picture's alpha (row A14).
+        let greatest = 70_000.0;
+        let with_alpha: Vec<f32> = (0..4 * PIXELS)
+            .map(|k| match (k % 4, (k / 4) % 5) {
+                (3, 0) => 1.0,
+                (3, _) => linear[k / 4] / greatest,
+                _ => colours[k],
+            })
+            .collect();
+        let mut alpha = sky_with(
+            &targets,
+            SkyComposition::OverPictureWithAlpha,
+            Preset::Medium,
+        );
+        let one_target = upload(FLOAT, &with_alpha);
+        alpha
+            .set_host_with_alpha(&gpu().device, &one_target, greatest)
+            .unwrap();
+        let difference = worst(&shoot(&mut alpha, &view), &shown, 1e-3, |_| true);
+        println!("  depth in alpha {difference:.2e}");
+        assert!(difference < 1e-3);
 
         // The point before which the air is, from the eye.
         let point = |i: usize| {

@@ -27,6 +27,8 @@ struct SkyDraw {
     sun_irradiance: vec3<f32>,
     // 1 for parallel rays.
     parallel: u32,
+    // What linear depth in the picture's alpha is divided by [m].
+    greatest_depth: f32,
 }
 
 @group(0) @binding(2) var<uniform> draw_view: SkyDraw;
@@ -110,7 +112,9 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 @group(1) @binding(3) var depths: texture_2d<f32>;
 @group(1) @binding(4) var columns: texture_2d_array<f32>;
 #ifdef AERIAL
+#ifndef AERIAL_ALPHA
 @group(2) @binding(0) var depth: texture_depth_2d;
+#endif
 #ifndef AERIAL_TARGETS
 @group(2) @binding(1) var picture: texture_2d<f32>;
 #endif
@@ -164,12 +168,24 @@ fn misses(dir: vec3<f32>) -> bool {
     return EYE_PLACE == 2 && place_of(dir).y > 1.0;
 }
 
-// Light and transmittance before what stands at a depth of the host's depth buffer.
-fn before(ray_at: vec3<f32>, seen: f32) -> AirLight {
-    var relative = ray_at * (draw_view.depth_numerator / (seen + draw_view.depth_offset));
+// Where something stands whose depth in the host's picture is `seen`, from the eye.
+#ifdef AERIAL_ALPHA
+fn place_seen(ray_at: vec3<f32>, seen: f32) -> vec3<f32> {
+    let along = seen * draw_view.greatest_depth;
+    return select(ray_at * along, ray_at + draw_view.forward * along, draw_view.parallel != 0u);
+}
+#else
+fn place_seen(ray_at: vec3<f32>, seen: f32) -> vec3<f32> {
     if draw_view.parallel != 0u {
-        relative = ray_at + draw_view.forward * ((seen - draw_view.depth_offset) * draw_view.depth_numerator);
+        return ray_at + draw_view.forward * ((seen - draw_view.depth_offset) * draw_view.depth_numerator);
     }
+    return ray_at * (draw_view.depth_numerator / (seen + draw_view.depth_offset));
+}
+#endif
+
+// Light and transmittance before what stands at a depth of the host's.
+fn before(ray_at: vec3<f32>, seen: f32) -> AirLight {
+    let relative = place_seen(ray_at, seen);
     let distance = length(relative);
     let dir = relative / max(distance, 1e-20);
     let place = place_of(dir);
@@ -223,14 +239,21 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
     let pixel_angle = length(dpdx(dir));
     let texel = vec2<i32>(in.position.xy);
+    let held = textureLoad(picture, texel, 0);
+#ifdef AERIAL_ALPHA
+    let seen = held.a;
+    let nothing = seen >= 1.0;
+#else
     let seen = textureLoad(depth, texel, 0);
-    if seen == draw_view.far_depth {
+    let nothing = seen == draw_view.far_depth;
+#endif
+    if nothing {
         // Where there is no air the host's picture stays, with its stars.
-        let space = select(vec3<f32>(0.0), textureLoad(picture, texel, 0).rgb, misses(dir));
+        let space = select(vec3<f32>(0.0), held.rgb, misses(dir));
         return shown((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance + space, in.position.xy);
     }
     let front = before(in.ray, seen);
-    let radiance = front.in_scatter * draw_view.sun_irradiance + front.transmittance * textureLoad(picture, texel, 0).rgb;
+    let radiance = front.in_scatter * draw_view.sun_irradiance + front.transmittance * held.rgb;
     return shown(radiance, in.position.xy);
 }
 #endif
