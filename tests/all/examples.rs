@@ -1,5 +1,8 @@
 //! The examples, run without a window.
 
+#[allow(dead_code)]
+#[path = "../../examples/earth_and_moon.rs"]
+mod earth_and_moon;
 #[allow(dead_code)] // Its `main` only prints what `draw` returns.
 #[path = "../../examples/host_app.rs"]
 mod host_app;
@@ -77,4 +80,31 @@ fn sky_over_host_puts_air_before_the_hosts_things() {
     let space = draw(200_000.0, 40.0, -25.0);
     assert!(mean(&space, [40, 2]).iter().all(|v| *v <= 1.0));
     assert!(mean(&space, [40, 45])[2] > 50.0);
+}
+
+#[test]
+fn earth_and_moon_shows_the_limb_before_the_stars() {
+    let size = [96, 54];
+    let shot = earth_and_moon::Shot {
+        altitude: 400.0,
+        sun_height: 10.0,
+        sun_azimuth: 110.0,
+        fov: 5.0,
+    };
+    let pixels = earth_and_moon::draw(size, &shot).unwrap();
+    let at = |x: usize, y: usize| &pixels[4 * (96 * y + x)..4 * (96 * y + x) + 3];
+    let row = |y: usize| -> [u32; 3] {
+        std::array::from_fn(|c| (0..96).map(|x| u32::from(at(x, y)[c])).sum::<u32>() / 96)
+    };
+    // Space above, then the blue of the limb, then the lit ground.
+    let (space, limb, ground) = (row(2), row(26), row(50));
+    println!("{space:?} {limb:?} {ground:?}");
+    assert!(space.iter().all(|v| *v < 12));
+    assert!(limb[2] > 60 && limb[2] > limb[0] + 20);
+    assert!(ground.iter().all(|v| *v > 90));
+    // The Moon is lit from the right.
+    let bright = |x: usize| (15..21).map(|y| u32::from(at(x, y)[0])).max().unwrap_or(0);
+    let moon: Vec<usize> = (20..45).filter(|x| bright(*x) > 60).collect();
+    println!("{moon:?}");
+    assert!(!moon.is_empty() && moon.len() < 12);
 }
