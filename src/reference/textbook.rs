@@ -3,7 +3,7 @@
 
 use super::air_ray::{AirRay, lowest_distance, ray_altitude, ray_sun_cosine};
 use super::medium::{air_densities, air_extinction, air_phases, air_scattering};
-use super::planet::{altitude_along, top_distance};
+use super::planet::altitude_along;
 use crate::atmosphere::{Atmosphere, MOST_LANES};
 
 /// Light that a ray brings and light that it leaves.
@@ -43,17 +43,14 @@ fn rising(air: &Atmosphere, h: f64, mu: f64, size: f64, steps: i32) -> [f64; MOS
 pub fn march_sun_depth(air: &Atmosphere, h: f64, sun_mu: f64, steps: i32) -> [f64; 3] {
     let (radius, steps) = (air.planet_radius, steps.max(1));
     let down = sun_mu.min(0.0);
-    let lowest = ((radius + h) * (1.0 - down * down).sqrt() - radius)
-        .max(0.0)
-        .min(h);
-    let mu = sun_mu.max(0.0);
-    let rise = rising(
-        air,
-        lowest,
-        mu,
-        top_distance(radius, air.thickness, lowest, mu),
-        steps,
-    );
+    let sine = (1.0 - down * down).sqrt();
+    // Sums, since even here a path of metres at the top of the air is lost in a difference of altitudes.
+    let below = ((radius + h) * down * down / (1.0 + sine)).min(h);
+    let (lowest, mu) = (h - below, sun_mu.max(0.0));
+    let square = (air.thickness - h + below).max(0.0) * (2.0 * radius + air.thickness + lowest);
+    let along = (radius + lowest) * mu;
+    let size = square / (along + (along * along + square).sqrt()).max(1e-300);
+    let rise = rising(air, lowest, mu, size, steps);
     let fall = rising(air, lowest, 0.0, -(radius + h) * down, steps);
     air_extinction(air, std::array::from_fn(|k| rise[k] + fall[k]))
 }
