@@ -352,6 +352,11 @@ impl Profile {
         }
     }
 
+    /// Whether the density is made of ramps rather than of an exponential.
+    fn is_ramps(&self) -> bool {
+        !matches!(self, Profile::Exponential { .. })
+    }
+
     /// Fall, rise, its offset, sink and its offset, as `FourLayers` has them.
     fn ramps(&self) -> [f64; 5] {
         match *self {
@@ -473,7 +478,9 @@ impl Atmosphere {
 
     /// The lanes: every lobe of every layer, and every layer that only absorbs, in order.
     pub fn lanes(&self) -> Vec<Lane> {
-        self.layers.iter().flat_map(Layer::lanes).collect()
+        let mut lanes: Vec<Lane> = self.layers.iter().flat_map(Layer::lanes).collect();
+        lanes.sort_by_key(|lane| !lane.profile.is_ramps());
+        lanes
     }
 
     /// The lobe that tables leave out of the light of peaked lanes: of those the one with the largest g.
@@ -503,6 +510,8 @@ impl Atmosphere {
         if let Some(peak) = self.peak() {
             words[3..6].copy_from_slice(&[peak.g, peak.level, peak.square].map(bits));
         }
+        let ramps = lanes.iter().filter(|lane| lane.profile.is_ramps());
+        words[6] = ramps.count() as u32;
         words[8..11].copy_from_slice(&self.ground_albedo.map(bits));
         for (i, lane) in lanes.iter().enumerate() {
             let lobe = lane.lobe.map_or([0.0; 5], |lobe| {

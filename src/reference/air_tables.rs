@@ -16,21 +16,63 @@ pub fn horizon_cosine(ground_radius: f64, h: f64) -> f64 {
     -(h * (2.0 * ground_radius + h)).sqrt() / (ground_radius + h)
 }
 
+/// Where level paths are in the table of columns.
+const LEVEL: f64 = 1.0 / 3.0;
+/// Zenith cosine up to which rising paths are dense.
+const RISE_BEND: f64 = 0.1;
+
 /// Coordinates in the table of columns.
 pub fn column_coordinates(ground_radius: f64, top: f64, h: f64, mu: f64) -> [f64; 2] {
-    let horizon = horizon_cosine(ground_radius, h);
-    let above = (mu - horizon) / (1.0 - horizon);
-    [
-        above.clamp(0.0, 1.0).sqrt(),
-        (h / top).clamp(0.0, 1.0).sqrt(),
-    ]
+    let x = if mu < 0.0 {
+        let horizon = horizon_cosine(ground_radius, h).min(-1e-20);
+        LEVEL * (1.0 - (mu / horizon).clamp(0.0, 1.0).sqrt())
+    } else {
+        let up = mu.min(1.0);
+        LEVEL + (1.0 - LEVEL) * (1.0 + RISE_BEND) * up / (up + RISE_BEND)
+    };
+    [x, (h / top).clamp(0.0, 1.0).sqrt()]
 }
 
 /// Altitude and zenith cosine of coordinates in the table of columns.
 pub fn column_place(ground_radius: f64, top: f64, place: [f64; 2]) -> [f64; 2] {
     let h = top * place[1] * place[1];
-    let horizon = horizon_cosine(ground_radius, h);
-    [h, horizon + (1.0 - horizon) * place[0] * place[0]]
+    let mu = if place[0] < LEVEL {
+        horizon_cosine(ground_radius, h) * (1.0 - place[0] / LEVEL).powi(2)
+    } else {
+        let above = (place[0] - LEVEL) / (1.0 - LEVEL);
+        above * RISE_BEND / (1.0 + RISE_BEND - above)
+    };
+    [h, mu]
+}
+
+/// A path to the top of the air, outwards from its lowest point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TopPath {
+    /// Altitude of the lowest point.
+    pub lowest: f64,
+    /// Distance of the lowest point from that of the whole line.
+    pub along: f64,
+    /// Length from the lowest point to the top.
+    pub rises: f64,
+    /// Length from the start to the lowest point.
+    pub falls: f64,
+}
+
+/// The path from an altitude along a zenith cosine to the top of the air; what would lie below the ground runs along it.
+pub fn path_to_top(ground_radius: f64, top: f64, h: f64, mu: f64) -> TopPath {
+    let down = mu.min(0.0);
+    let sine = ((1.0 - down) * (1.0 + down)).max(0.0).sqrt();
+    // A sum, since even here a path of metres at the top of the air is lost in a difference of altitudes.
+    let below = ((ground_radius + h) * down * down / (1.0 + sine)).min(h);
+    let lowest = h - below;
+    let along = (ground_radius + lowest) * mu.max(0.0);
+    let square = (top - h + below).max(0.0) * (2.0 * ground_radius + top + lowest);
+    TopPath {
+        lowest,
+        along,
+        rises: square / (along + (along * along + square).sqrt()).max(1e-300),
+        falls: -(ground_radius + h) * down,
+    }
 }
 
 /// Densities of exponential lanes at the lowest point of a path that does not go below the ground; 1 for the others.
@@ -65,6 +107,23 @@ pub fn columns_to_top(air: &Atmosphere, h: f64, mu: f64) -> [f64; MOST_LANES] {
         *column = at.map_or(0.0, |k| found[k]);
     }
     columns
+}
+
+/// What the table of columns holds: one over the root of the mean density along a path over the density at its lowest point; 1 for
+/// lanes that are not exponential.
+pub fn column_code(air: &Atmosphere, h: f64, mu: f64) -> [f64; MOST_LANES] {
+    let seen = mu.max(horizon_cosine(air.planet_radius, h));
+    let path = path_to_top(air.planet_radius, air.thickness, h, seen);
+    let columns = columns_to_top(air, h, seen);
+    let scales = column_scale(air, h, seen);
+    let long = path.rises + path.falls;
+    let lanes = air.lanes();
+    std::array::from_fn(|k| match lanes.get(k).map(|lane| lane.profile) {
+        Some(Profile::Exponential { .. }) if long > 1e-3 => {
+            (scales[k] * long / columns[k]).max(1.0).sqrt()
+        }
+        _ => 1.0,
+    })
 }
 
 /// Optical depth to the sun; that along the horizon of a sun below it. Nothing for an atmosphere that is not valid.

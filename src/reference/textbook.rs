@@ -2,6 +2,7 @@
 //! schedule and rule miss is judged by [`super::sky`].
 
 use super::air_ray::{AirRay, lowest_distance, ray_altitude, ray_sun_cosine};
+use super::air_tables::path_to_top;
 use super::medium::{air_densities, air_extinction, air_phases, air_scattering};
 use super::planet::altitude_along;
 use crate::atmosphere::{Atmosphere, MOST_LANES};
@@ -42,16 +43,9 @@ fn rising(air: &Atmosphere, h: f64, mu: f64, size: f64, steps: i32) -> [f64; MOS
 /// Optical depth from altitude `h` to the sun at the zenith cosine `sun_mu`; a sun below the horizon counts as just above.
 pub fn march_sun_depth(air: &Atmosphere, h: f64, sun_mu: f64, steps: i32) -> [f64; 3] {
     let (radius, steps) = (air.planet_radius, steps.max(1));
-    let down = sun_mu.min(0.0);
-    let sine = (1.0 - down * down).sqrt();
-    // Sums, since even here a path of metres at the top of the air is lost in a difference of altitudes.
-    let below = ((radius + h) * down * down / (1.0 + sine)).min(h);
-    let (lowest, mu) = (h - below, sun_mu.max(0.0));
-    let square = (air.thickness - h + below).max(0.0) * (2.0 * radius + air.thickness + lowest);
-    let along = (radius + lowest) * mu;
-    let size = square / (along + (along * along + square).sqrt()).max(1e-300);
-    let rise = rising(air, lowest, mu, size, steps);
-    let fall = rising(air, lowest, 0.0, -(radius + h) * down, steps);
+    let path = path_to_top(radius, air.thickness, h, sun_mu);
+    let rise = rising(air, path.lowest, sun_mu.max(0.0), path.rises, steps);
+    let fall = rising(air, path.lowest, 0.0, path.falls, steps);
     air_extinction(air, std::array::from_fn(|k| rise[k] + fall[k]))
 }
 
