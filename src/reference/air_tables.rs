@@ -5,6 +5,7 @@ use super::math::{dot, mix, one_minus_exp_over_x, scale};
 use super::medium::{air_phases, air_scattering, peak_phase};
 use super::parallel::parallel_map;
 use super::planet::top_distance;
+use super::quadrature::squared_node;
 use super::sky::{Sky, SkyRay};
 use super::sky_paths::{Paths, trace_sky};
 use crate::atmosphere::{Atmosphere, Lane, MOST_LANES, Profile};
@@ -354,6 +355,78 @@ pub fn diffuse_moments(
     });
     moments.aside = moments.aside.map(|sum| sum / all);
     (moments, error)
+}
+
+/// Light of all orders, that of the ground included, on planes at a place, each with its standard error: by paths in so many directions
+/// drawn evenly. The sun stands over +x; its own light is not counted.
+pub fn plane_irradiance_by_paths(
+    sky: &Sky,
+    h: f64,
+    sun_mu: f64,
+    normals: &[[f64; 3]],
+    directions: usize,
+    seed: u64,
+) -> Vec<([f64; 3], [f64; 3])> {
+    let paths = Paths {
+        samples: 2,
+        seed,
+        ..Default::default()
+    };
+    let rays = parallel_map(directions, |i| {
+        let [u, v] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3]
+            .map(|step: f64| (0.5 + step * (i + 1) as f64).fract());
+        let (mu, phi) = (1.0 - 2.0 * u, 2.0 * PI * v);
+        let sine = (1.0 - mu * mu).sqrt();
+        let ray = SkyRay {
+            eye_altitude: h,
+            dir: [sine * phi.cos(), mu, sine * phi.sin()],
+            to_sun: [(1.0 - sun_mu * sun_mu).max(0.0).sqrt(), sun_mu, 0.0],
+            distance: f64::INFINITY,
+        };
+        (ray.dir, trace_sky(sky, &ray, &paths, i as u64))
+    });
+    let part = 4.0 * PI / directions as f64;
+    normals
+        .iter()
+        .map(|normal| {
+            let (mut sum, mut variance) = ([0.0; 3], [0.0; 3]);
+            for (dir, light) in &rays {
+                let weight = part * dot(*normal, *dir).max(0.0);
+                for c in 0..3 {
+                    sum[c] += weight * light.mean[c];
+                    variance[c] += (weight * light.standard_error[c]).powi(2);
+                }
+            }
+            (sum, variance.map(f64::sqrt))
+        })
+        .collect()
+}
+
+/// A node of the quadrature over directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SphereNode {
+    /// Zenith cosine.
+    pub mu: f64,
+    /// Cosine of the azimuth from the sun.
+    pub cos_phi: f64,
+    /// Solid angle.
+    pub solid: f64,
+}
+
+/// Node number `i` of 384 around a place: 16 azimuths of 16 heights above and 8 below the horizon.
+pub fn sphere_node(ground_radius: f64, h: f64, i: i32) -> SphereNode {
+    let horizon = horizon_cosine(ground_radius, h);
+    let (row, spoke) = (i / 16, i % 16);
+    let (to, [t, weight]) = if row < 16 {
+        (1.0, squared_node(16, row))
+    } else {
+        (-1.0, squared_node(8, row - 16))
+    };
+    SphereNode {
+        mu: horizon + (to - horizon) * t,
+        cos_phi: (PI * (f64::from(spoke) + 0.5) / 16.0).cos(),
+        solid: (to - horizon).abs() * weight * PI / 16.0,
+    }
 }
 
 /// The phase functions of a ray, split into those of smooth and peaked layers.

@@ -2,7 +2,8 @@
 
 use veduta::reference::air_ray::{self, AirRay};
 use veduta::reference::air_tables::{
-    self, Moments, Scattered, SkyEye, SkyLook, SkyPlace, SkyTexel, SplitPhases, TopPath,
+    self, Moments, Scattered, SkyEye, SkyLook, SkyPlace, SkyTexel, SphereNode, SplitPhases,
+    TopPath,
 };
 use veduta::reference::atmosphere::{Atmosphere, SkyLight};
 use veduta::reference::clouds::{CloudLayer, CloudLight};
@@ -62,6 +63,10 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
     (
         "veduta::atmosphere::textbook::march_air_columns",
         "the_joint_march_meets_quadrature",
+    ),
+    (
+        "veduta::atmosphere::irradiance::seen_radiance",
+        "light_of_the_sky_on_planes_meets_paths",
     ),
     (
         "veduta::atmosphere::orders::order_moments",
@@ -435,6 +440,12 @@ impl Answer for AirRay {
             self.dark_to,
             f64::from(self.meets_ground),
         ])
+    }
+}
+
+impl Answer for SphereNode {
+    fn values(self) -> Values {
+        Values::new(&[self.mu, self.cos_phi, self.solid])
     }
 }
 
@@ -1276,6 +1287,12 @@ pub fn registry() -> Vec<Entry> {
         texture_place,
         texel_coordinates,
         sun_above_horizon
+    );
+    other!(
+        list,
+        "atmosphere::irradiance::sphere_node",
+        "air_tables::sphere_node",
+        air_tables::sphere_node
     );
     other!(
         list,
