@@ -2,8 +2,7 @@
 
 use veduta::reference::air_ray::{self, AirRay};
 use veduta::reference::air_tables::{
-    self, Moments, Scattered, SkyEye, SkyLook, SkyPlace, SkyTexel, SphereNode, SplitPhases,
-    TopPath,
+    self, Moments, Scattered, SkyEye, SkyLook, SkyPlace, SkyTexel, SphereNode, SplitPhases, TopPath,
 };
 use veduta::reference::atmosphere::{Atmosphere, SkyLight};
 use veduta::reference::clouds::{CloudLayer, CloudLight};
