@@ -476,7 +476,8 @@ impl Atmosphere {
         self.planet_radius + self.thickness
     }
 
-    /// The lanes: every lobe of every layer, and every layer that only absorbs, in order.
+    /// The lanes: every lobe of every layer, and every layer that only absorbs; those that are not exponential first, else
+    /// in order.
     pub fn lanes(&self) -> Vec<Lane> {
         let mut lanes: Vec<Lane> = self.layers.iter().flat_map(Layer::lanes).collect();
         lanes.sort_by_key(|lane| !lane.profile.is_ramps());
@@ -510,8 +511,6 @@ impl Atmosphere {
         if let Some(peak) = self.peak() {
             words[3..6].copy_from_slice(&[peak.g, peak.level, peak.square].map(bits));
         }
-        let ramps = lanes.iter().filter(|lane| lane.profile.is_ramps());
-        words[6] = ramps.count() as u32;
         words[8..11].copy_from_slice(&self.ground_albedo.map(bits));
         for (i, lane) in lanes.iter().enumerate() {
             let lobe = lane.lobe.map_or([0.0; 5], |lobe| {
@@ -532,9 +531,12 @@ impl Atmosphere {
         Ok(words)
     }
 
-    /// The flags that the programs of the atmosphere need for this air.
+    /// The flags that the programs of the atmosphere need for this air: `AIR_EIGHT_LANES` for more than four lanes, and for more than one
+    /// that is not exponential.
     pub fn features(&self) -> &'static [&'static str] {
-        if self.lanes().len() > 4 {
+        let lanes = self.lanes();
+        let ramps = lanes.iter().filter(|lane| lane.profile.is_ramps()).count();
+        if lanes.len() > 4 || ramps > 1 {
             &["AIR_EIGHT_LANES"]
         } else {
             &[]

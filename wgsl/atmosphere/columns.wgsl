@@ -159,22 +159,19 @@ fn ramp_columns(layers: FourLayers, ground_radius: f32, top: f32, h: f32, path: 
     return select(others, columns, layers.rise > vec4<f32>(0.0));
 }
 
-/// Puts the columns of lanes that are not exponential, which come first, in their places. Air with one of them, or none, does not pay for more: a
-/// loop without a round is passed over everywhere, a branch is not.
+/// Puts the columns of lanes that are not exponential, which come first, in their places. Air with more than one of them needs AIR_EIGHT_LANES, so
+/// that other air does not pay for more.
 ///
 /// internal
 fn with_ramps(air: Air, h: f32, path: TopPath, exponential: Lanes) -> Lanes {
     var lanes = exponential;
-    for (var once = 0u; once < select(0u, 1u, air.ramp_lanes == 1u); once++) {
-        let ramps = vec4<f32>(air.low.rise.x, air.low.rise_offset.x, air.low.sink.x, air.low.sink_offset.x);
-        lanes.low.x = ramp_column(air.ground_radius, air.top, h, path, ramps);
-    }
-    for (var once = 0u; once < select(0u, 1u, air.ramp_lanes > 1u); once++) {
-        lanes.low = ramp_columns(air.low, air.ground_radius, air.top, h, path, lanes.low);
 #ifdef AIR_EIGHT_LANES
-        lanes.high = ramp_columns(air.high, air.ground_radius, air.top, h, path, lanes.high);
+    lanes.low = ramp_columns(air.low, air.ground_radius, air.top, h, path, lanes.low);
+    lanes.high = ramp_columns(air.high, air.ground_radius, air.top, h, path, lanes.high);
+#else
+    let ramps = vec4<f32>(max(air.low.rise.x, 1e-30), air.low.rise_offset.x, min(air.low.sink.x, -1e-30), air.low.sink_offset.x);
+    lanes.low.x = select(lanes.low.x, ramp_column(air.ground_radius, air.top, h, path, ramps), air.low.rise.x > 0.0);
 #endif
-    }
     return lanes;
 }
 

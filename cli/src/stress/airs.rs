@@ -95,14 +95,13 @@ pub fn wgsl() -> String {
         };
         let _ = writeln!(
             text,
-            "    if which % {COUNT}u == {i}u {{ return {TYPE}({}, {}, {}u, {}, {}, {}, {}u, {}, {}, {}); }}",
+            "    if which % {COUNT}u == {i}u {{ return {TYPE}({}, {}, {}u, {}, {}, {}, {}, {}, {}); }}",
             number(0),
             number(1),
             words[2],
             number(3),
             number(4),
             number(5),
-            words[6],
             vector(8, 3),
             lanes(12),
             lanes(80)
