@@ -213,7 +213,7 @@ fn columns_to_top(air: Air, h: f32, mu: f32) -> Lanes {
 /// domain  h in [0, air.top] m lin
 /// domain  mu in [-1, 1] 1 lin
 /// range   [1, 1e3] 1
-/// error   3e-4 rel of reference::air_tables::column_code
+/// error   1e-4 rel of reference::air_tables::column_code
 /// outside undefined
 /// source  ours
 fn column_code(air: Air, h: f32, mu: f32) -> Lanes {
