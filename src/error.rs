@@ -72,9 +72,6 @@ pub enum Error {
     /// A text is not the RON that it should be, or cannot be written as RON.
     #[error("{0}")]
     Ron(String),
-    /// What is asked for is not part of this version.
-    #[error("{0} cannot be had in this version")]
-    NotYet(String),
     /// A value lies outside what is allowed, or is not finite.
     #[error("`{name}` is {value}, but must be {domain}")]
     OutOfDomain {

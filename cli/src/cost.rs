@@ -20,7 +20,7 @@ use crate::bench::{Bench, table};
 use crate::commands::compose::with_values;
 use crate::commands::render::{Job, RenderArgs};
 use crate::error::CliError;
-use crate::render::{Output, Renderer, Size, guarded, median};
+use crate::render::{Output, Renderer, Size, guarded, median, picture};
 
 /// How a variant differs from the scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -262,20 +262,11 @@ impl Variant {
 /// Records a frame of 8x8 pixels; what `prepare` and `composite` did.
 fn frame(gpu: &Gpu, landscape: &mut Landscape, view: &View) -> Result<(Work, Work), CliError> {
     guarded(gpu, || {
-        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("frame"),
-            size: wgpu::Extent3d {
-                width: 8,
-                height: 8,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: Targets::default().color_format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-            view_formats: &[],
-        });
+        let size = Size {
+            width: 8,
+            height: 8,
+        };
+        let texture = picture(&gpu.device, size, Targets::default().color_format);
         let target = texture.create_view(&Default::default());
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let prepared = landscape.prepare(&gpu.device, &gpu.queue, &mut encoder, view)?;

@@ -198,6 +198,24 @@ pub(crate) fn guarded<T>(
     }
 }
 
+/// A texture to draw a picture into and to read it from.
+pub fn picture(device: &wgpu::Device, size: Size, format: wgpu::TextureFormat) -> wgpu::Texture {
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("picture"),
+        size: wgpu::Extent3d {
+            width: size.width,
+            height: size.height,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}
+
 impl Renderer {
     /// Creates the pipeline and the texture.
     ///
@@ -212,20 +230,7 @@ impl Renderer {
     ) -> Result<Renderer, CliError> {
         size.check(&gpu.device)?;
         guarded(gpu, || {
-            let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("picture"),
-                size: wgpu::Extent3d {
-                    width: size.width,
-                    height: size.height,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: output.format(),
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            });
+            let texture = picture(&gpu.device, size, output.format());
             let targets = Targets {
                 color_format: output.format(),
                 ..Targets::default()

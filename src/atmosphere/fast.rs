@@ -23,8 +23,8 @@ const RESULT: usize = 32;
 const WORKGROUP: u32 = 64;
 
 impl FastProbe {
-    /// Builds the pipelines. With `march` above 0, in [1, 256], every ray is marched with so many steps a stretch through the tables of
-    /// the air alone; with 0 the tables of the eye are read.
+    /// Builds the pipelines. With `march` above 0, in [1, 256], every ray is marched with so many steps of two samples a stretch through
+    /// the tables of the air alone; with 0 the tables of the eye are read.
     ///
     /// # Errors
     /// As [`SkyTables::new`].
@@ -41,7 +41,10 @@ impl FastProbe {
             programs,
             atmosphere,
             "sky_probe",
-            &[("PROBE_MARCH", f64::from(march.min(256)))],
+            &[
+                ("PROBE_MARCH", f64::from(march.min(256))),
+                ("ALL_ORDERS", f64::from(u8::from(quality.all_orders))),
+            ],
         )?;
         Ok(FastProbe {
             tables,

@@ -352,6 +352,11 @@ impl Profile {
         }
     }
 
+    /// Whether the density is made of ramps rather than of an exponential.
+    fn is_ramps(&self) -> bool {
+        !matches!(self, Profile::Exponential { .. })
+    }
+
     /// Fall, rise, its offset, sink and its offset, as `FourLayers` has them.
     fn ramps(&self) -> [f64; 5] {
         match *self {
@@ -471,9 +476,12 @@ impl Atmosphere {
         self.planet_radius + self.thickness
     }
 
-    /// The lanes: every lobe of every layer, and every layer that only absorbs, in order.
+    /// The lanes: every lobe of every layer, and every layer that only absorbs; those that are not exponential first, else
+    /// in order.
     pub fn lanes(&self) -> Vec<Lane> {
-        self.layers.iter().flat_map(Layer::lanes).collect()
+        let mut lanes: Vec<Lane> = self.layers.iter().flat_map(Layer::lanes).collect();
+        lanes.sort_by_key(|lane| !lane.profile.is_ramps());
+        lanes
     }
 
     /// The lobe that tables leave out of the light of peaked lanes: of those the one with the largest g.
@@ -523,9 +531,12 @@ impl Atmosphere {
         Ok(words)
     }
 
-    /// The flags that the programs of the atmosphere need for this air.
+    /// The flags that the programs of the atmosphere need for this air: `AIR_EIGHT_LANES` for more than four lanes, and for more than one
+    /// that is not exponential.
     pub fn features(&self) -> &'static [&'static str] {
-        if self.lanes().len() > 4 {
+        let lanes = self.lanes();
+        let ramps = lanes.iter().filter(|lane| lane.profile.is_ramps()).count();
+        if lanes.len() > 4 || ramps > 1 {
             &["AIR_EIGHT_LANES"]
         } else {
             &[]

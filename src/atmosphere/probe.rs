@@ -187,8 +187,7 @@ impl Probe {
     /// Builds the pipeline and uploads the air.
     ///
     /// # Errors
-    /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for counts; [`Error::NotYet`]; the faults of [`ProgramSet::get`] and of making the
-    /// pipeline.
+    /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for counts; the faults of [`ProgramSet::get`] and of making the pipeline.
     pub fn new(
         device: &wgpu::Device,
         programs: &ProgramSet,

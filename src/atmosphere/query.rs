@@ -94,8 +94,7 @@ pub struct SkyQuery {
 
 const PLACE: usize = 32;
 const RESULT: usize = 32;
-const WORKGROUP: usize = 64;
-/// Workgroups of one dispatch, by WebGPU's default limits.
+/// Workgroups of one dispatch, by WebGPU's default limits; a workgroup finds the light of one place.
 const MOST_WORKGROUPS: usize = 65_535;
 
 impl SkyQuery {
@@ -117,11 +116,12 @@ impl SkyQuery {
     }
 
     /// The light at each place, in their order. Submits and waits; makes those tables anew that the air of `tables` asks for, none for an
-    /// eye. What [`SkyTables::prepare`] has recorded before must have been submitted.
+    /// eye. What [`SkyTables::prepare`] has recorded before must have been submitted. The sky's light is summed over 768 directions of every
+    /// place, each a march through the tables.
     ///
     /// # Errors
-    /// [`Error::OutOfDomain`] with the index of a place outside of its domain, and for too many places or tables of another kind of air;
-    /// [`Error::Device`].
+    /// [`Error::OutOfDomain`] with the index of a place outside of its domain, and for tables of another kind of air or without light of all
+    /// orders; [`Error::Device`].
     pub fn run(
         &self,
         device: &wgpu::Device,
@@ -140,20 +140,33 @@ impl SkyQuery {
             let lobes = tables.atmosphere().lanes().len();
             return fault("tables", lobes, "as many lobes as those of the query's air");
         }
-        if places.len() > WORKGROUP * MOST_WORKGROUPS {
-            return fault("places", places.len(), "at most 4,194,240");
-        }
-        if places.is_empty() {
-            return Ok(Vec::new());
+        if !tables.quality().all_orders {
+            return fault("tables.all_orders", 0, "on");
         }
         let mut bytes = Vec::with_capacity(places.len() * PLACE);
         for (at, place) in places.iter().enumerate() {
             place.check(&format!("places[{at}]"), tables.atmosphere().thickness)?;
             bytes.extend(place.bytes());
         }
+        let mut results = Vec::with_capacity(places.len());
+        for part in bytes.chunks(MOST_WORKGROUPS * PLACE) {
+            self.run_part(device, queue, tables, part, &mut results)?;
+        }
+        Ok(results)
+    }
+
+    fn run_part(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        tables: &mut SkyTables,
+        places: &[u8],
+        results: &mut Vec<PlaceLight>,
+    ) -> Result<(), Error> {
+        let count = places.len() / PLACE;
         let mut encoder = device.create_command_encoder(&Default::default());
         let _ = tables.prepare_air(queue, &mut encoder)?;
-        let exchange = Exchange::new(device, queue, &bytes, places.len() * RESULT);
+        let exchange = Exchange::new(device, queue, places, count * RESULT);
         let view = wgpu::BindingResource::TextureView;
         let groups = bind_groups(
             device,
@@ -170,14 +183,18 @@ impl SkyQuery {
                 &[(0, exchange.output.as_entire_binding())],
             ],
         );
-        let workgroups = places.len().div_ceil(WORKGROUP) as u32;
-        let found = exchange.run(device, queue, encoder, &self.pipeline, &groups, workgroups)?;
-        Ok(found
-            .chunks_exact(RESULT)
-            .map(|result| PlaceLight {
-                sun: three(result, 0),
-                sky: three(result, 16),
-            })
-            .collect())
+        let found = exchange.run(
+            device,
+            queue,
+            encoder,
+            &self.pipeline,
+            &groups,
+            count as u32,
+        )?;
+        results.extend(found.chunks_exact(RESULT).map(|result| PlaceLight {
+            sun: three(result, 0),
+            sky: three(result, 16),
+        }));
+        Ok(())
     }
 }

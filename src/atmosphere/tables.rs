@@ -563,8 +563,7 @@ impl SkyTables {
     /// Changes the air; the next [`SkyTables::prepare`] makes anew what depends on the change.
     ///
     /// # Errors
-    /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for an air that needs other programs: one with more than four lobes instead
-    /// of one with at most four, or the other way round.
+    /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for an air that needs other programs, which [`Atmosphere::features`] tells.
     pub fn set_atmosphere(&mut self, atmosphere: &Atmosphere) -> Result<(), Error> {
         atmosphere.check()?;
         if atmosphere.features() != self.atmosphere.features() {
@@ -572,7 +571,7 @@ impl SkyTables {
                 name: "atmosphere.layers".to_owned(),
                 value: format!("{} lobes", atmosphere.lanes().len()),
                 domain:
-                    "on the same side of four lobes as before; other air needs tables of its own"
+                    "air with the same `Atmosphere::features` as before; other air needs tables of its own"
                         .to_owned(),
             });
         }

@@ -5,6 +5,7 @@ use super::math::{dot, mix, one_minus_exp_over_x, scale};
 use super::medium::{air_phases, air_scattering, peak_phase};
 use super::parallel::parallel_map;
 use super::planet::top_distance;
+use super::quadrature::squared_node;
 use super::sky::{Sky, SkyRay};
 use super::sky_paths::{Paths, trace_sky};
 use crate::atmosphere::{Atmosphere, Lane, MOST_LANES, Profile};
@@ -16,21 +17,63 @@ pub fn horizon_cosine(ground_radius: f64, h: f64) -> f64 {
     -(h * (2.0 * ground_radius + h)).sqrt() / (ground_radius + h)
 }
 
+/// Where level paths are in the table of columns.
+const LEVEL: f64 = 1.0 / 3.0;
+/// Zenith cosine up to which rising paths are dense.
+const RISE_BEND: f64 = 0.1;
+
 /// Coordinates in the table of columns.
 pub fn column_coordinates(ground_radius: f64, top: f64, h: f64, mu: f64) -> [f64; 2] {
-    let horizon = horizon_cosine(ground_radius, h);
-    let above = (mu - horizon) / (1.0 - horizon);
-    [
-        above.clamp(0.0, 1.0).sqrt(),
-        (h / top).clamp(0.0, 1.0).sqrt(),
-    ]
+    let x = if mu < 0.0 {
+        let horizon = horizon_cosine(ground_radius, h).min(-1e-20);
+        LEVEL * (1.0 - (mu / horizon).clamp(0.0, 1.0).sqrt())
+    } else {
+        let up = mu.min(1.0);
+        LEVEL + (1.0 - LEVEL) * (1.0 + RISE_BEND) * up / (up + RISE_BEND)
+    };
+    [x, (h / top).clamp(0.0, 1.0).sqrt()]
 }
 
 /// Altitude and zenith cosine of coordinates in the table of columns.
 pub fn column_place(ground_radius: f64, top: f64, place: [f64; 2]) -> [f64; 2] {
     let h = top * place[1] * place[1];
-    let horizon = horizon_cosine(ground_radius, h);
-    [h, horizon + (1.0 - horizon) * place[0] * place[0]]
+    let mu = if place[0] < LEVEL {
+        horizon_cosine(ground_radius, h) * (1.0 - place[0] / LEVEL).powi(2)
+    } else {
+        let above = (place[0] - LEVEL) / (1.0 - LEVEL);
+        above * RISE_BEND / (1.0 + RISE_BEND - above)
+    };
+    [h, mu]
+}
+
+/// A path to the top of the air, outwards from its lowest point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TopPath {
+    /// Altitude of the lowest point.
+    pub lowest: f64,
+    /// Distance of the lowest point from that of the whole line.
+    pub along: f64,
+    /// Length from the lowest point to the top.
+    pub rises: f64,
+    /// Length from the start to the lowest point.
+    pub falls: f64,
+}
+
+/// The path from an altitude along a zenith cosine to the top of the air; what would lie below the ground runs along it.
+pub fn path_to_top(ground_radius: f64, top: f64, h: f64, mu: f64) -> TopPath {
+    let down = mu.min(0.0);
+    let sine = ((1.0 - down) * (1.0 + down)).max(0.0).sqrt();
+    // A sum, since even here a path of metres at the top of the air is lost in a difference of altitudes.
+    let below = ((ground_radius + h) * down * down / (1.0 + sine)).min(h);
+    let lowest = h - below;
+    let along = (ground_radius + lowest) * mu.max(0.0);
+    let square = (top - h + below).max(0.0) * (2.0 * ground_radius + top + lowest);
+    TopPath {
+        lowest,
+        along,
+        rises: square / (along + (along * along + square).sqrt()).max(1e-300),
+        falls: -(ground_radius + h) * down,
+    }
 }
 
 /// Densities of exponential lanes at the lowest point of a path that does not go below the ground; 1 for the others.
@@ -65,6 +108,23 @@ pub fn columns_to_top(air: &Atmosphere, h: f64, mu: f64) -> [f64; MOST_LANES] {
         *column = at.map_or(0.0, |k| found[k]);
     }
     columns
+}
+
+/// What the table of columns holds: one over the root of the mean density along a path over the density at its lowest point; 1 for
+/// lanes that are not exponential.
+pub fn column_code(air: &Atmosphere, h: f64, mu: f64) -> [f64; MOST_LANES] {
+    let seen = mu.max(horizon_cosine(air.planet_radius, h));
+    let path = path_to_top(air.planet_radius, air.thickness, h, seen);
+    let columns = columns_to_top(air, h, seen);
+    let scales = column_scale(air, h, seen);
+    let long = path.rises + path.falls;
+    let lanes = air.lanes();
+    std::array::from_fn(|k| match lanes.get(k).map(|lane| lane.profile) {
+        Some(Profile::Exponential { .. }) if long > 1e-3 => {
+            (scales[k] * long / columns[k]).max(1.0).sqrt()
+        }
+        _ => 1.0,
+    })
 }
 
 /// Optical depth to the sun; that along the horizon of a sun below it. Nothing for an atmosphere that is not valid.
@@ -295,6 +355,78 @@ pub fn diffuse_moments(
     });
     moments.aside = moments.aside.map(|sum| sum / all);
     (moments, error)
+}
+
+/// Light of all orders, that of the ground included, on planes at a place, each with its standard error: by paths in so many directions
+/// drawn evenly. The sun stands over +x; its own light is not counted.
+pub fn plane_irradiance_by_paths(
+    sky: &Sky,
+    h: f64,
+    sun_mu: f64,
+    normals: &[[f64; 3]],
+    directions: usize,
+    seed: u64,
+) -> Vec<([f64; 3], [f64; 3])> {
+    let paths = Paths {
+        samples: 2,
+        seed,
+        ..Default::default()
+    };
+    let rays = parallel_map(directions, |i| {
+        let [u, v] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3]
+            .map(|step: f64| (0.5 + step * (i + 1) as f64).fract());
+        let (mu, phi) = (1.0 - 2.0 * u, 2.0 * PI * v);
+        let sine = (1.0 - mu * mu).sqrt();
+        let ray = SkyRay {
+            eye_altitude: h,
+            dir: [sine * phi.cos(), mu, sine * phi.sin()],
+            to_sun: [(1.0 - sun_mu * sun_mu).max(0.0).sqrt(), sun_mu, 0.0],
+            distance: f64::INFINITY,
+        };
+        (ray.dir, trace_sky(sky, &ray, &paths, i as u64))
+    });
+    let part = 4.0 * PI / directions as f64;
+    normals
+        .iter()
+        .map(|normal| {
+            let (mut sum, mut variance) = ([0.0; 3], [0.0; 3]);
+            for (dir, light) in &rays {
+                let weight = part * dot(*normal, *dir).max(0.0);
+                for c in 0..3 {
+                    sum[c] += weight * light.mean[c];
+                    variance[c] += (weight * light.standard_error[c]).powi(2);
+                }
+            }
+            (sum, variance.map(f64::sqrt))
+        })
+        .collect()
+}
+
+/// A node of the quadrature over directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SphereNode {
+    /// Zenith cosine.
+    pub mu: f64,
+    /// Cosine of the azimuth from the sun.
+    pub cos_phi: f64,
+    /// Solid angle.
+    pub solid: f64,
+}
+
+/// Node number `i` of 384 around a place: 16 azimuths of 16 heights above and 8 below the horizon.
+pub fn sphere_node(ground_radius: f64, h: f64, i: i32) -> SphereNode {
+    let horizon = horizon_cosine(ground_radius, h);
+    let (row, spoke) = (i / 16, i % 16);
+    let (to, [t, weight]) = if row < 16 {
+        (1.0, squared_node(16, row))
+    } else {
+        (-1.0, squared_node(8, row - 16))
+    };
+    SphereNode {
+        mu: horizon + (to - horizon) * t,
+        cos_phi: (PI * (f64::from(spoke) + 0.5) / 16.0).cos(),
+        solid: (to - horizon).abs() * weight * PI / 16.0,
+    }
 }
 
 /// The phase functions of a ray, split into those of smooth and peaked layers.

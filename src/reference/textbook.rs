@@ -2,8 +2,9 @@
 //! schedule and rule miss is judged by [`super::sky`].
 
 use super::air_ray::{AirRay, lowest_distance, ray_altitude, ray_sun_cosine};
+use super::air_tables::path_to_top;
 use super::medium::{air_densities, air_extinction, air_phases, air_scattering};
-use super::planet::{altitude_along, top_distance};
+use super::planet::altitude_along;
 use crate::atmosphere::{Atmosphere, MOST_LANES};
 
 /// Light that a ray brings and light that it leaves.
@@ -42,19 +43,9 @@ fn rising(air: &Atmosphere, h: f64, mu: f64, size: f64, steps: i32) -> [f64; MOS
 /// Optical depth from altitude `h` to the sun at the zenith cosine `sun_mu`; a sun below the horizon counts as just above.
 pub fn march_sun_depth(air: &Atmosphere, h: f64, sun_mu: f64, steps: i32) -> [f64; 3] {
     let (radius, steps) = (air.planet_radius, steps.max(1));
-    let down = sun_mu.min(0.0);
-    let lowest = ((radius + h) * (1.0 - down * down).sqrt() - radius)
-        .max(0.0)
-        .min(h);
-    let mu = sun_mu.max(0.0);
-    let rise = rising(
-        air,
-        lowest,
-        mu,
-        top_distance(radius, air.thickness, lowest, mu),
-        steps,
-    );
-    let fall = rising(air, lowest, 0.0, -(radius + h) * down, steps);
+    let path = path_to_top(radius, air.thickness, h, sun_mu);
+    let rise = rising(air, path.lowest, sun_mu.max(0.0), path.rises, steps);
+    let fall = rising(air, path.lowest, 0.0, path.falls, steps);
     air_extinction(air, std::array::from_fn(|k| rise[k] + fall[k]))
 }
 

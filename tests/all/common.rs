@@ -1,8 +1,12 @@
 //! What the tests share: the device, the modules of this repository, rows and comparisons.
 
+use veduta::Atmosphere;
+use veduta::atmosphere::ProbeLight;
 use veduta::device::{Gpu, shared};
 use veduta::eval::{Evaluator, Spec};
 use veduta::reference::monte_carlo::splitmix64;
+use veduta::reference::probe::Probed;
+use veduta::reference::sky::SkyRadiance;
 use veduta_compose::library::Library;
 
 /// The shared device; its absence fails the test with the line that installs a driver.
@@ -56,6 +60,81 @@ impl Random {
     pub fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
+
+    /// The next number in [low, high) with all digits of `f64`.
+    pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// A shipped atmosphere.
+pub fn named(name: &str) -> Atmosphere {
+    Atmosphere::named(name).unwrap()
+}
+
+/// The unit vector of an elevation and an azimuth in radians, y up.
+pub fn heading(elevation: f64, azimuth: f64) -> [f64; 3] {
+    let (e, a) = (elevation, azimuth);
+    [e.cos() * a.cos(), e.sin(), e.cos() * a.sin()]
+}
+
+/// What a reference says of a ray.
+pub trait Truth {
+    /// Radiance scattered into it.
+    fn in_scatter(&self) -> [f64; 3];
+    /// Transmittance to its end.
+    fn transmittance(&self) -> [f64; 3];
+}
+
+impl Truth for Probed {
+    fn in_scatter(&self) -> [f64; 3] {
+        self.in_scatter
+    }
+    fn transmittance(&self) -> [f64; 3] {
+        self.transmittance
+    }
+}
+
+impl Truth for SkyRadiance {
+    fn in_scatter(&self) -> [f64; 3] {
+        self.in_scatter
+    }
+    fn transmittance(&self) -> [f64; 3] {
+        self.transmittance
+    }
+}
+
+/// A channel of the light that a ray brings, and the truth of it.
+pub fn light(found: &ProbeLight, truth: &impl Truth, c: usize) -> (f64, f64) {
+    (f64::from(found.in_scatter[c]), truth.in_scatter()[c])
+}
+
+/// A channel of the light that is left, and the truth of it.
+pub fn left(found: &ProbeLight, truth: &impl Truth, c: usize) -> (f64, f64) {
+    (f64::from(found.transmittance[c]), truth.transmittance()[c])
+}
+
+/// Errors of all channels over the truth or a floor, with their rays; the smallest first.
+pub fn errors<T>(
+    found: &[ProbeLight],
+    truth: &[T],
+    floor: f64,
+    part: fn(&ProbeLight, &T, usize) -> (f64, f64),
+) -> Vec<(f64, usize)> {
+    let mut all: Vec<(f64, usize)> = (0..3 * found.len())
+        .map(|k| {
+            let (f, t) = part(&found[k / 3], &truth[k / 3], k % 3);
+            assert!(f.is_finite(), "ray {}", k / 3);
+            ((f - t).abs() / t.abs().max(floor), k / 3)
+        })
+        .collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all
+}
+
+/// The error that a share of all stays below.
+pub fn centile(all: &[(f64, usize)], share: f64) -> f64 {
+    all[((all.len() - 1) as f64 * share) as usize].0
 }
 
 /// A picture in `f32`, four channels a pixel, row after row from the top.

@@ -2,7 +2,7 @@
 //! Afra's checklist).
 
 use crate::accuracy::{bits, log_between, rows};
-use crate::common::{Random, evaluator, gpu};
+use crate::common::{Random, centile, errors, evaluator, gpu, heading, left, light, named};
 use veduta::Atmosphere;
 use veduta::atmosphere::{
     AirRay, Layer, Phase, Probe, ProbeLight, ProbeOptions, ProbeRay, Profile,
@@ -34,10 +34,6 @@ fn probe(air: &Atmosphere, steps: u32, light_steps: u32, rays: &[ProbeRay]) -> V
     .unwrap()
 }
 
-fn named(name: &str) -> Atmosphere {
-    Atmosphere::named(name).unwrap()
-}
-
 fn sky_of(name: &str) -> Sky {
     Sky::new(&named(name)).unwrap()
 }
@@ -57,15 +53,6 @@ fn truth(sky: &Sky, rays: &[ProbeRay]) -> Vec<SkyRadiance> {
     })
 }
 
-fn uniform(random: &mut Random, low: f64, high: f64) -> f64 {
-    low + (high - low) * (random.bits() >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-fn heading(elevation: f64, azimuth: f64) -> [f64; 3] {
-    let (e, a) = (elevation, azimuth);
-    [e.cos() * a.cos(), e.sin(), e.cos() * a.sin()]
-}
-
 /// Rays of the kinds that the bars are about: heights from 0 to 36,000 km, sun zenith 0 to 96 degrees, directions all over,
 /// about the horizon and across the limb, ends near and far.
 fn mixed_rays(count: usize, seed: u64) -> Vec<ProbeRay> {
@@ -83,30 +70,30 @@ fn mixed_rays(count: usize, seed: u64) -> Vec<ProbeRay> {
             let altitude = if i % 4 == 0 {
                 exact[(i / 4) % exact.len()]
             } else {
-                2.0 * (uniform(random, 0.0, (3.6e7_f64 / 2.0).ln())).exp()
+                2.0 * (random.uniform(0.0, (3.6e7_f64 / 2.0).ln())).exp()
             };
             let r = RADIUS + altitude;
             let turn = std::f64::consts::TAU;
-            let azimuth = uniform(random, 0.0, turn);
+            let azimuth = random.uniform(0.0, turn);
             // The elevation of the line that touches the sphere of an altitude; of the horizon, for those inside.
             let touching = |level: f64| -((RADIUS + level) / r).min(1.0).acos();
             let elevation = match i % 5 {
-                0 | 1 if altitude <= TOP => uniform(random, -1.0, 1.0).asin(),
+                0 | 1 if altitude <= TOP => random.uniform(-1.0, 1.0).asin(),
                 0 | 1 => {
                     let least = touching(TOP);
-                    (-uniform(random, (-least).sin(), 1.0)).asin()
+                    (-random.uniform((-least).sin(), 1.0)).asin()
                 }
-                2 => touching(0.0) + uniform(random, -0.05, 0.05).to_radians(),
-                3 => touching(uniform(random, 0.0, TOP)),
+                2 => touching(0.0) + random.uniform(-0.05, 0.05).to_radians(),
+                3 => touching(random.uniform(0.0, TOP)),
                 _ => {
                     touching(if i % 2 == 0 { 0.0 } else { TOP })
-                        + uniform(random, -2.0, 2.0).to_radians()
+                        + random.uniform(-2.0, 2.0).to_radians()
                 }
             };
-            let zenith = uniform(random, 0.0, 96.0).to_radians();
+            let zenith = random.uniform(0.0, 96.0).to_radians();
             let to_sun = heading(
                 std::f64::consts::FRAC_PI_2 - zenith,
-                azimuth + uniform(random, 0.0, turn),
+                azimuth + random.uniform(0.0, turn),
             );
             let dir = heading(elevation, azimuth);
             let distance = if i % 3 == 0 {
@@ -123,7 +110,7 @@ fn mixed_rays(count: usize, seed: u64) -> Vec<ProbeRay> {
                     )
                     .from_eye,
                 );
-                near + 10.0 * uniform(random, 0.0, 1e5_f64.ln()).exp()
+                near + 10.0 * random.uniform(0.0, 1e5_f64.ln()).exp()
             } else {
                 f64::INFINITY
             };
@@ -135,36 +122,6 @@ fn mixed_rays(count: usize, seed: u64) -> Vec<ProbeRay> {
             }
         })
         .collect()
-}
-
-/// Errors of all channels, relative to the truth or to `floor`, with their rays; the smallest first.
-fn errors(
-    found: &[ProbeLight],
-    truth: &[SkyRadiance],
-    floor: f64,
-    part: fn(&ProbeLight, &SkyRadiance, usize) -> (f64, f64),
-) -> Vec<(f64, usize)> {
-    let mut all: Vec<(f64, usize)> = (0..3 * found.len())
-        .map(|k| {
-            let (f, t) = part(&found[k / 3], &truth[k / 3], k % 3);
-            assert!(f.is_finite(), "ray {}", k / 3);
-            ((f - t).abs() / t.abs().max(floor), k / 3)
-        })
-        .collect();
-    all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    all
-}
-
-fn light(found: &ProbeLight, truth: &SkyRadiance, c: usize) -> (f64, f64) {
-    (f64::from(found.in_scatter[c]), truth.in_scatter[c])
-}
-
-fn left(found: &ProbeLight, truth: &SkyRadiance, c: usize) -> (f64, f64) {
-    (f64::from(found.transmittance[c]), truth.transmittance[c])
-}
-
-fn centile(all: &[(f64, usize)], share: f64) -> f64 {
-    all[((all.len() - 1) as f64 * share) as usize].0
 }
 
 /// Median, 99th centile and the worst.
@@ -242,8 +199,8 @@ fn row_a08_what_lies_in_the_planets_shadow_is_black() {
             let mut any = mixed_rays(1, random.bits())[0];
             any.altitude = any.altitude.min(1e4);
             any.to_sun = heading(
-                -uniform(random, 27.0, 90.0).to_radians(),
-                uniform(random, 0.0, 6.0),
+                -random.uniform(27.0, 90.0).to_radians(),
+                random.uniform(0.0, 6.0),
             );
             any
         })
@@ -703,7 +660,7 @@ fn the_shadow_of_a_ray_is_where_the_sun_is_hidden() {
             made.dark_from < made.dark_to && made.dark_to - made.dark_from < made.length,
         );
         for _ in 0..8 {
-            let t = made.length * uniform(random, 0.0, 1.0);
+            let t = made.length * random.uniform(0.0, 1.0);
             let eye = [0.0, RADIUS + ray.altitude, 0.0];
             let place = math::add(eye, math::scale(ray.dir, made.from_eye + t));
             let along = math::dot(place, ray.to_sun);

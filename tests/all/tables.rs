@@ -1,9 +1,10 @@
 //! The tables of air and sky: their mappings, what they hold against quadrature and paths in f64, and what is made anew when
 //! (row A07: that of Afra's checklist).
 
-use crate::common::{Random, evaluator, gpu};
+use crate::common::{Random, centile, errors, evaluator, gpu, heading, left, light, named};
 use veduta::atmosphere::{
-    AirRay, Eye, FastProbe, Orders, ProbeLight, ProbeRay, SkyQuality, SkyTables,
+    AirRay, Eye, FastProbe, LightPlace, Orders, ProbeLight, ProbeRay, SkyQuality, SkyQuery,
+    SkyTables,
 };
 use veduta::reference::probe::{Effort, Probed, probe};
 use veduta::reference::sky::Sky;
@@ -11,10 +12,6 @@ use veduta::reference::{air_tables, medium};
 use veduta::{Atmosphere, Preset, Settings};
 
 const FAR: f64 = f64::INFINITY;
-
-fn named(name: &str) -> Atmosphere {
-    Atmosphere::named(name).unwrap()
-}
 
 fn quality(preset: Preset) -> SkyQuality {
     SkyQuality::of(&Settings::resolve(veduta::programs(), &preset, None, &[]).unwrap())
@@ -36,15 +33,6 @@ fn truth(air: &Atmosphere, rays: &[ProbeRay], orders: Orders, samples: usize) ->
     probe(air, rays, orders, &effort).unwrap()
 }
 
-fn uniform(random: &mut Random, low: f64, high: f64) -> f64 {
-    low + (high - low) * (random.bits() >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-fn heading(elevation: f64, azimuth: f64) -> [f64; 3] {
-    let (e, a) = (elevation, azimuth);
-    [e.cos() * a.cos(), e.sin(), e.cos() * a.sin()]
-}
-
 /// Elevation of the line from an altitude that touches the sphere of another, or of the horizontal.
 fn touching(air: &Atmosphere, altitude: f64, level: f64) -> f64 {
     let ratio = (air.planet_radius + level) / (air.planet_radius + altitude);
@@ -57,55 +45,25 @@ fn rays_of_eyes(air: &Atmosphere, eyes: usize, each: usize, seed: u64) -> Vec<Pr
     let random = &mut Random(seed);
     let mut rays = Vec::new();
     for _ in 0..eyes {
-        let altitude = 2.0 * uniform(random, 0.0, 1.8e7_f64.ln()).exp();
-        let sun = std::f64::consts::FRAC_PI_2 - uniform(random, 0.0, 96.0).to_radians();
+        let altitude = 2.0 * random.uniform(0.0, 1.8e7_f64.ln()).exp();
+        let sun = std::f64::consts::FRAC_PI_2 - random.uniform(0.0, 96.0).to_radians();
         for i in 0..each {
             let level = |h| touching(air, altitude, h);
             let elevation = match i % 4 {
-                0 | 1 if altitude <= air.thickness => uniform(random, -1.0, 1.0).asin(),
-                0 | 1 => -uniform(random, (-level(air.thickness)).sin(), 1.0).asin(),
-                2 => level(0.0) + uniform(random, -3.0, 3.0).to_radians(),
-                _ => level(uniform(random, 0.0, air.thickness)),
+                0 | 1 if altitude <= air.thickness => random.uniform(-1.0, 1.0).asin(),
+                0 | 1 => -random.uniform((-level(air.thickness)).sin(), 1.0).asin(),
+                2 => level(0.0) + random.uniform(-3.0, 3.0).to_radians(),
+                _ => level(random.uniform(0.0, air.thickness)),
             };
             rays.push(ProbeRay {
                 altitude,
-                dir: heading(elevation, uniform(random, 0.0, std::f64::consts::TAU)),
+                dir: heading(elevation, random.uniform(0.0, std::f64::consts::TAU)),
                 to_sun: heading(sun, 0.0),
                 distance: FAR,
             });
         }
     }
     rays
-}
-
-/// Errors of all channels over the truth or a floor, with their rays; the smallest first.
-fn errors(
-    found: &[ProbeLight],
-    truth: &[Probed],
-    floor: f64,
-    part: fn(&ProbeLight, &Probed, usize) -> (f64, f64),
-) -> Vec<(f64, usize)> {
-    let mut all: Vec<(f64, usize)> = (0..3 * found.len())
-        .map(|k| {
-            let (f, t) = part(&found[k / 3], &truth[k / 3], k % 3);
-            assert!(f.is_finite(), "ray {}", k / 3);
-            ((f - t).abs() / t.abs().max(floor), k / 3)
-        })
-        .collect();
-    all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    all
-}
-
-fn light(found: &ProbeLight, truth: &Probed, c: usize) -> (f64, f64) {
-    (f64::from(found.in_scatter[c]), truth.in_scatter[c])
-}
-
-fn left(found: &ProbeLight, truth: &Probed, c: usize) -> (f64, f64) {
-    (f64::from(found.transmittance[c]), truth.transmittance[c])
-}
-
-fn centile(all: &[(f64, usize)], share: f64) -> f64 {
-    all[((all.len() - 1) as f64 * share) as usize].0
 }
 
 /// Median, 95th and 99th centile and the worst.
@@ -193,9 +151,38 @@ const NOON: Eye = Eye {
     sun_angular_radius: 0.004652,
 };
 
+/// Paths from everywhere in the air to everywhere above the horizon, many of them low, level or at an edge of a layer.
+fn paths_to_the_sun(air: &Atmosphere, count: usize) -> Vec<ProbeRay> {
+    let top = air.thickness;
+    let random = &mut Random(7);
+    let quarter = std::f64::consts::FRAC_PI_2;
+    (0..count)
+        .map(|i| {
+            let h = match i % 3 {
+                0 => top * random.uniform(0.0, 1.0).powi(2),
+                1 => random.uniform(0.0, top),
+                _ => top * random.uniform(0.0, 1.0).powi(4),
+            };
+            let horizon = touching(air, h, 0.0);
+            let elevation = match i % 4 {
+                0 => horizon + (quarter - horizon) * random.uniform(0.0, 1.0),
+                1 => horizon + (quarter - horizon) * random.uniform(0.0, 1.0).powi(4),
+                2 => random.uniform(horizon.max(-0.05), 0.05),
+                _ => touching(air, h, 42e3 * random.uniform(0.0, 1.0).sqrt()),
+            };
+            ProbeRay {
+                altitude: h,
+                dir: heading(elevation, 0.0),
+                to_sun: [0.0, 1.0, 0.0],
+                distance: FAR,
+            }
+        })
+        .collect()
+}
+
 #[test]
 fn row_a07_the_table_of_columns_is_right_at_every_height_and_angle() {
-    for name in ["earth", "thesis", "hazy", "mars"] {
+    for name in ["earth", "thesis", "hazy", "afra", "mars"] {
         let air = named(name);
         let (radius, top) = (air.planet_radius, air.thickness);
         let quality = quality(Preset::High);
@@ -207,71 +194,118 @@ fn row_a07_the_table_of_columns_is_right_at_every_height_and_angle() {
             let at = 8 * (y * size[0] + x) + 2 * lane;
             f16([data[at], data[at + 1]])
         };
-        // The table as `sun_depth` reads it, interpolated by hand.
+        let lanes = air.lanes();
+        // The table as `sun_depth` reads it, interpolated by hand; layers of ramps are not in it.
         let by_hand = |h: f64, mu: f64| -> [f64; 8] {
             let at = air_tables::column_coordinates(radius, top, h, mu);
             let place: [f64; 2] = std::array::from_fn(|k| at[k] * (size[k] - 1) as f64);
             let low = [0, 1].map(|k| (place[k] as usize).min(size[k] - 2));
             let share: [f64; 2] = std::array::from_fn(|k| place[k] - low[k] as f64);
             let scale = air_tables::column_scale(&air, h, mu);
+            let path = air_tables::path_to_top(radius, top, h, mu);
+            let exact = air_tables::columns_to_top(&air, h, mu);
             std::array::from_fn(|lane| {
-                if lane >= 4 {
-                    return 0.0;
+                let ramps = lanes.get(lane).is_none_or(|lane| {
+                    !matches!(
+                        lane.profile,
+                        veduta::atmosphere::Profile::Exponential { .. }
+                    )
+                });
+                if ramps {
+                    return exact[lane];
                 }
                 let row = |y| {
                     let [a, b] = [0, 1].map(|x| texel(low[0] + x, y, lane));
                     a + (b - a) * share[0]
                 };
                 let [a, b] = [row(low[1]), row(low[1] + 1)];
-                (a + (b - a) * share[1]) * scale[lane] * top
+                let code = a + (b - a) * share[1];
+                scale[lane] * (path.rises + path.falls) / (code * code)
             })
         };
-        let random = &mut Random(7);
-        let mut rays = Vec::new();
-        for i in 0..4000 {
-            let h = match i % 3 {
-                0 => top * uniform(random, 0.0, 1.0).powi(2),
-                1 => uniform(random, 0.0, top),
-                _ => top * uniform(random, 0.0, 1.0).powi(4),
-            };
-            let horizon = touching(&air, h, 0.0);
-            let above = uniform(random, 0.0, 1.0).powi(if i % 2 == 0 { 1 } else { 4 });
-            let elevation = horizon + (std::f64::consts::FRAC_PI_2 - horizon) * above;
-            rays.push(ProbeRay {
-                altitude: h,
-                dir: heading(elevation, 0.0),
-                to_sun: [0.0, 1.0, 0.0],
-                distance: FAR,
-            });
-        }
+        let rays = paths_to_the_sun(&air, 8000);
         let truth: Vec<[f64; 3]> = rays
             .iter()
             .map(|r| air_tables::sun_depth(&air, r.altitude, r.dir[1]))
             .collect();
-        let mut off: Vec<(f64, usize)> = Vec::new();
+        // What the device makes of the table; of what is left of the sun no depth below 1e-3 follows to 0.1 %.
+        let places: Vec<LightPlace> = rays
+            .iter()
+            .map(|r| LightPlace {
+                altitude: r.altitude,
+                to_sun: r.dir,
+                normal: [0.0, 1.0, 0.0],
+                sun_angular_radius: 0.0,
+            })
+            .collect();
+        let lit = SkyQuery::new(&gpu().device, veduta::programs(), &air)
+            .and_then(|q| q.run(&gpu().device, &gpu().queue, &mut tables, &places))
+            .unwrap();
+        let (mut off, mut seen) = (Vec::new(), Vec::new());
         for (k, ray) in rays.iter().enumerate() {
             let found = medium::air_extinction(&air, by_hand(ray.altitude, ray.dir[1]));
+            let above = ray.dir[1].asin() - touching(&air, ray.altitude, 0.0);
             for c in 0..3 {
-                off.push(((found[c] - truth[k][c]).abs() / truth[k][c].max(1e-2), k));
+                if truth[k][c] > 0.0 {
+                    off.push((found[c] / truth[k][c] - 1.0, k));
+                }
+                if above > 1e-5 && truth[k][c] < 80.0 {
+                    let depth = -f64::from(lit[k].sun[c]).ln();
+                    seen.push(((depth - truth[k][c]) / truth[k][c].max(1e-3), k));
+                }
             }
         }
-        off.sort_by(|a, b| a.0.total_cmp(&b.0));
-        println!("{name}: optical depth to the sun {}", shown(&off));
-        let (worst, at) = off[off.len() - 1];
-        println!("    {:.1} % at {}", 100.0 * worst, told(&air, &rays[at]));
-        assert!(centile(&off, 0.95) <= 0.005);
-        // The same table as the device filters it, of up to a hundred eyes.
-        let some: Vec<ProbeRay> = rays.iter().step_by(40).copied().collect();
-        let filtered = fast(&air, &quality, &some);
+        assert!(seen.len() > 20_000, "{}", seen.len());
+        for (by, all) in [("by hand", &mut off), ("on the device", &mut seen)] {
+            all.iter_mut().for_each(|(off, _)| *off = off.abs());
+            all.sort_by(|a, b| a.0.total_cmp(&b.0));
+            println!("{name}, {by}: optical depth to the sun {}", shown(all));
+            let (worst, at) = all[all.len() - 1];
+            println!("    {:.2} % at {}", 100.0 * worst, told(&air, &rays[at]));
+            assert!(worst <= 0.005);
+        }
+        // Filtered by hand and by the device.
         let mut worst = 0.0_f64;
-        for (ray, found) in some.iter().zip(&filtered) {
+        for (ray, lit) in rays.iter().zip(&lit) {
             let depth = medium::air_extinction(&air, by_hand(ray.altitude, ray.dir[1]));
-            for (own, depth) in found.transmittance.iter().zip(depth) {
-                worst = worst.max((f64::from(*own) - (-depth).exp()).abs());
+            if ray.dir[1].asin() - touching(&air, ray.altitude, 0.0) > 1e-5 {
+                for (own, depth) in lit.sun.iter().zip(depth) {
+                    worst = worst.max((f64::from(*own) - (-depth).exp()).abs());
+                }
             }
         }
         println!("{name}: filtered by the device and by hand: {worst:.1e} of the transmittance");
         assert!(worst < 1e-3, "{worst:e}");
+    }
+}
+
+/// `march_air_columns`, which `ProbePath::Textbook` takes for all orders.
+#[test]
+fn the_joint_march_meets_quadrature() {
+    for (name, seed) in [("earth", 1), ("thesis", 2), ("hazy", 3)] {
+        let air = named(name);
+        let rays = rays_of_eyes(&air, 24, 40, seed);
+        let truth = truth(&air, &rays, Orders::Single, 0);
+        let quality = SkyQuality {
+            all_orders: false,
+            ..SkyQuality::finest()
+        };
+        let gpu = gpu();
+        let found = FastProbe::new(&gpu.device, veduta::programs(), &air, &quality, 64)
+            .and_then(|mut p| p.run(&gpu.device, &gpu.queue, &rays))
+            .unwrap();
+        let light = errors(&found, &truth, 1e-6, light);
+        let left = errors(&found, &truth, 1e-6, left);
+        println!(
+            "{name}: in-scatter {}, transmittance {}",
+            shown(&light),
+            shown(&left)
+        );
+        let (worst, at) = light[light.len() - 1];
+        println!("    {:.2} % at {}", 100.0 * worst, told(&air, &rays[at]));
+        assert!(centile(&light, 0.5) <= 0.0005);
+        assert!(centile(&light, 0.99) <= 0.01);
+        assert!(centile(&left, 0.99) <= 0.001);
     }
 }
 
@@ -284,19 +318,19 @@ fn air_before_things_meets_quadrature() {
         let mut rays = Vec::new();
         for eye in 0..24 {
             let altitude = [2.0, 30.0, 500.0, 3000.0, 12_000.0, 40_000.0][eye % 6];
-            let sun = uniform(random, -4.0, 90.0).to_radians();
+            let sun = random.uniform(-4.0, 90.0).to_radians();
             for i in 0..40 {
                 let horizon = touching(&air, altitude, 0.0);
                 let elevation = match i % 3 {
-                    0 => uniform(random, -1.0, 1.0).asin(),
-                    1 => horizon + uniform(random, -3.0, 3.0).to_radians(),
-                    _ => -uniform(random, 0.0, 1.0).powi(2).asin(),
+                    0 => random.uniform(-1.0, 1.0).asin(),
+                    1 => horizon + random.uniform(-3.0, 3.0).to_radians(),
+                    _ => -random.uniform(0.0, 1.0).powi(2).asin(),
                 };
                 rays.push(ProbeRay {
                     altitude,
-                    dir: heading(elevation, uniform(random, 0.0, std::f64::consts::TAU)),
+                    dir: heading(elevation, random.uniform(0.0, std::f64::consts::TAU)),
                     to_sun: heading(sun, 0.0),
-                    distance: 100.0 * (1000_f64.ln() * uniform(random, 0.0, 1.0)).exp(),
+                    distance: 100.0 * (1000_f64.ln() * random.uniform(0.0, 1.0)).exp(),
                 });
             }
         }
@@ -328,13 +362,13 @@ fn ground_rays(zeniths: &[f64], each: usize, seed: u64) -> Vec<ProbeRay> {
         let sun = (90.0 - zenith).to_radians();
         for i in 0..each {
             let elevation = if i % 4 == 3 {
-                uniform(random, 0.0, 5.0).to_radians()
+                random.uniform(0.0, 5.0).to_radians()
             } else {
-                uniform(random, 0.0, 1.0).asin()
+                random.uniform(0.0, 1.0).asin()
             };
             rays.push(ProbeRay {
                 altitude: 2.0,
-                dir: heading(elevation, uniform(random, 0.0, std::f64::consts::TAU)),
+                dir: heading(elevation, random.uniform(0.0, std::f64::consts::TAU)),
                 to_sun: heading(sun, 0.0),
                 distance: FAR,
             });
@@ -419,6 +453,74 @@ fn moments_of_diffuse_light_meet_paths() {
             // Ten heights and three azimuths see little of the haze's glow about a low sun.
             let bar = if sun_mu > 0.3 { 0.03 } else { 0.12_f64 };
             assert!(off.abs() <= bar.hypot(3.0 * own));
+        }
+    }
+}
+
+/// `SkyQuery`, and with it `seen_radiance`, against paths: on Earth 2 % on level planes, 5 % on tilted ones.
+#[test]
+fn light_of_the_sky_on_planes_meets_paths() {
+    let normals = [
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [-1.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.6, 0.8, 0.0],
+        [-0.6, 0.8, 0.0],
+        [0.0, -1.0, 0.0],
+    ];
+    let earth: &[(f64, f64)] = &[
+        (2.0, -6.0),
+        (2.0, -2.0),
+        (2.0, 0.0),
+        (2.0, 4.0),
+        (2.0, 15.0),
+        (2.0, 45.0),
+        (2.0, 90.0),
+        (4000.0, 8.0),
+    ];
+    for (name, cases) in [("earth", earth), ("hazy", &[(2.0, 3.0), (30_000.0, 30.0)])] {
+        let air = named(name);
+        let sky = Sky::new(&air).unwrap();
+        let mut tables = tables_of(&air, &quality(Preset::High));
+        let query = SkyQuery::new(&gpu().device, veduta::programs(), &air).unwrap();
+        for &(h, height) in cases {
+            let to_sun = heading(f64::to_radians(height), 0.0);
+            let places = normals.map(|normal| LightPlace {
+                altitude: h,
+                to_sun,
+                normal,
+                sun_angular_radius: 0.0,
+            });
+            let found = query
+                .run(&gpu().device, &gpu().queue, &mut tables, &places)
+                .unwrap();
+            let directions = if height <= 4.0 { 30_000 } else { 6_000 };
+            let truth =
+                air_tables::plane_irradiance_by_paths(&sky, h, to_sun[1], &normals, directions, 5);
+            for (k, (found, (truth, error))) in found.iter().zip(&truth).enumerate() {
+                let off: [f64; 3] =
+                    std::array::from_fn(|c| f64::from(found.sky[c]) / truth[c].max(1e-30) - 1.0);
+                let own: [f64; 3] = std::array::from_fn(|c| error[c] / truth[c].max(1e-30));
+                println!(
+                    "{name} {h:.0} m, sun {height}, {:?}: {:.2?} % +- {:.2?}",
+                    normals[k],
+                    off.map(|o| 100.0 * o),
+                    own.map(|o| 100.0 * o)
+                );
+                for c in 0..3 {
+                    // Ten times the aerosol under a low sun: 4 % too dark.
+                    let bar = match (name, k) {
+                        ("earth", 0) => 0.02_f64,
+                        ("earth", _) => 0.05,
+                        _ => 0.1,
+                    };
+                    // At dusk paths hardly find what comes from below.
+                    if normals[k][1] >= 0.0 || height > 0.0 && truth[c] > 1e-6 {
+                        assert!(off[c].abs() <= bar.hypot(3.0 * own[c]));
+                    }
+                }
+            }
         }
     }
 }
@@ -631,6 +733,10 @@ fn coordinates_of_columns_and_diffuse_light_come_back() {
             .unwrap();
         let mut worst = [0.0_f64; 2];
         for (found, row) in found.chunks(2).zip(&rows) {
+            // No path falls on the ground.
+            if row[1] == 0.0 && row[0] < 1.0 / 3.0 && imports.contains("column_place") {
+                continue;
+            }
             for k in 0..2 {
                 worst[k] = worst[k].max((found[k] - f64::from(row[k])).abs());
             }
@@ -653,7 +759,7 @@ fn coordinates_of_columns_and_diffuse_light_come_back() {
             air_tables::column_place(6.36e6, 1e5, place)[1],
             air_tables::diffuse_place(1e5, place)[1],
         ];
-        assert!((found[0] - truth[0]).abs() < 3e-7 && (found[1] - truth[1]).abs() < 2e-6);
+        assert!((found[0] - truth[0]).abs() < 2e-6 && (found[1] - truth[1]).abs() < 2e-6);
     }
 }
 

@@ -11,7 +11,7 @@ struct Lanes {
     high: vec4<f32>,
 }
 
-/// Four layers. The density of a layer is exp(fall h) clamp(min(rise h + rise_offset, sink h + sink_offset), 0, 1).
+/// Four layers, those that are not exponential first. The density of a layer is exp(fall h) clamp(min(rise h + rise_offset, sink h + sink_offset), 0, 1).
 struct FourLayers {
     /// Minus the reciprocal of the scale height, 0 for a layer that is not exponential [1/m].
     fall: vec4<f32>,

@@ -180,6 +180,7 @@ fn ray_inside(ground_radius: f32, top: f32, h: f32, dir: vec2<f32>, to_sun: vec3
 /// domain  max_distance in [1, 1e9] m log
 /// range   [-1, 1e9] 1
 /// error   1e-5 abs of reference::air_ray::air_ray
+/// outside undefined
 /// source  Bruneton2017 (boundary distances); entry by the tangent altitude: ours
 fn air_ray(ground_radius: f32, top: f32, eye_altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, max_distance: f32) -> AirRay {
     let h = max(eye_altitude, 0.0);
@@ -205,7 +206,7 @@ fn air_ray(ground_radius: f32, top: f32, eye_altitude: f32, dir: vec3<f32>, to_s
     let rise = sine * sun.y - mu * sun.x;
     let entry_mu = -min(half_top / (ground_radius + top), 1.0);
     let entry_sine = min(sine * ((ground_radius + h) / (ground_radius + top)), 1.0);
-    let entry_sun = vec3<f32>(entry_sine * along - entry_mu * rise, entry_mu * along + entry_sine * rise, sun.z);
+    let entry_sun = vec3<f32>(entry_sine * along - entry_mu * rise, clamp(entry_mu * along + entry_sine * rise, -1.0, 1.0), sun.z);
     var ray = ray_inside(ground_radius, top, top, vec2<f32>(entry_sine, entry_mu), entry_sun, max_distance - from_eye);
     ray.from_eye = from_eye;
     return ray;

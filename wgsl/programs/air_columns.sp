@@ -5,7 +5,7 @@ The table of columns between every altitude and the sun, layer by layer. Made an
 #COMPUTE{
     #CODE{
 #import veduta::atmosphere::medium::{Air}
-#import veduta::atmosphere::columns::{column_place, column_scale, columns_to_top, texel_coordinates}
+#import veduta::atmosphere::columns::{column_place, column_code, texel_coordinates}
 
 @group(0) @binding(0) var<uniform> air: Air;
 @group(2) @binding(0) var columns: texture_storage_2d_array<rgba16float, write>;
@@ -17,12 +17,10 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let place = column_place(air.ground_radius, air.top, texel_coordinates(vec2<f32>(id.xy), vec2<f32>(size)));
-    let lanes = columns_to_top(air, place.x, place.y);
-    let scale = column_scale(air, place.x, place.y);
-    let unit = 1.0 / air.top;
-    textureStore(columns, id.xy, 0, lanes.low * unit / max(scale.low, vec4<f32>(1e-30)));
+    let code = column_code(air, place.x, place.y);
+    textureStore(columns, id.xy, 0, code.low);
 #ifdef AIR_EIGHT_LANES
-    textureStore(columns, id.xy, 1, lanes.high * unit / max(scale.high, vec4<f32>(1e-30)));
+    textureStore(columns, id.xy, 1, code.high);
 #endif
 }
     }#

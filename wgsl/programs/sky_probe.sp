@@ -9,10 +9,12 @@ Light along given rays of one eye, read from its tables. Nothing is drawn.
 #import veduta::atmosphere::sky_view::{SkyEye, sky_coded, sky_place, sky_radiance}
 #import veduta::atmosphere::aerial::{aerial_light}
 #import veduta::atmosphere::columns::{sun_depth}
-#import veduta::atmosphere::scatter::{scatter_along, scattered_radiance}
+#import veduta::atmosphere::textbook::{march_air_columns}
 
 // Steps of a march along every ray through the tables of the air alone; 0: the tables of the eye are read.
 override PROBE_MARCH: i32 = 0;
+// Whether the march adds light of all orders; the tables of the eye have it or not.
+override ALL_ORDERS: i32 = 1;
 
 struct EyeRay {
     dir: vec3<f32>,
@@ -48,8 +50,8 @@ fn probe(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     if PROBE_MARCH > 0 {
         let short = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, rays[id.x].distance);
-        let marched = scatter_along(columns, moments, linear, air, short, eye.sun_angular_radius, true, PROBE_MARCH);
-        results[id.x] = ProbeLight(scattered_radiance(air, marched, ray.nu), marched.transmittance);
+        let marched = march_air_columns(columns, moments, linear, air, short, ALL_ORDERS != 0, PROBE_MARCH);
+        results[id.x] = ProbeLight(marched.in_scatter, marched.transmittance);
         return;
     }
     let t = rays[id.x].distance - ray.from_eye;

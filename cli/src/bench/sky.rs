@@ -18,6 +18,7 @@ use super::timing::Middle;
 use super::{Bench, table};
 use crate::cpu::CpuTime;
 use crate::error::CliError;
+use crate::render::picture;
 
 /// The presets that are measured.
 pub const PRESETS: [&str; 3] = ["low", "medium", "high"];
@@ -260,20 +261,7 @@ pub fn run(
     let march_errors = errors(&march.run(&gpu.device, &gpu.queue, &rays)?, &truth);
 
     let size = bench.size;
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("picture"),
-        size: wgpu::Extent3d {
-            width: size.width,
-            height: size.height,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba16Float,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-        view_formats: &[],
-    });
+    let texture = picture(&gpu.device, size, wgpu::TextureFormat::Rgba16Float);
     let target = texture.create_view(&Default::default());
     let mut view = View {
         eye: WorldPos::from_metres(veduta::glam::DVec3::new(0.0, 2.0, 0.0)),

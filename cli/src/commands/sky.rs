@@ -11,7 +11,7 @@ use super::probe::atmosphere;
 use crate::error::CliError;
 use crate::image::{check_folder, check_output, write_exr, write_png};
 use crate::metrics::Picture;
-use crate::render::Size;
+use crate::render::{Size, picture};
 
 /// Arguments of `veduta sky`.
 #[derive(Debug, Clone, clap::Args)]
@@ -118,21 +118,7 @@ pub fn run(args: &SkyArgs) -> Result<(), CliError> {
     };
     let mut sky = Sky::new(&gpu.device, veduta::programs(), &targets, &options)?;
     let (width, height) = (args.size.width, args.size.height);
-    let texture = gpu.device.create_texture(&veduta::wgpu::TextureDescriptor {
-        label: Some("picture"),
-        size: veduta::wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: veduta::wgpu::TextureDimension::D2,
-        format,
-        usage: veduta::wgpu::TextureUsages::RENDER_ATTACHMENT
-            | veduta::wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    });
+    let texture = picture(&gpu.device, args.size, format);
     let target = texture.create_view(&Default::default());
     let mut pictures = Vec::new();
     for sun_height in &args.sun_height {

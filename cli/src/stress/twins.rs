@@ -2,7 +2,7 @@
 
 use veduta::reference::air_ray::{self, AirRay};
 use veduta::reference::air_tables::{
-    self, Moments, Scattered, SkyEye, SkyLook, SkyPlace, SkyTexel, SplitPhases,
+    self, Moments, Scattered, SkyEye, SkyLook, SkyPlace, SkyTexel, SphereNode, SplitPhases, TopPath,
 };
 use veduta::reference::atmosphere::{Atmosphere, SkyLight};
 use veduta::reference::clouds::{CloudLayer, CloudLight};
@@ -58,6 +58,14 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
     (
         "veduta::atmosphere::diffuse::diffuse_moments",
         "moments_of_diffuse_light_meet_paths",
+    ),
+    (
+        "veduta::atmosphere::textbook::march_air_columns",
+        "the_joint_march_meets_quadrature",
+    ),
+    (
+        "veduta::atmosphere::irradiance::seen_radiance",
+        "light_of_the_sky_on_planes_meets_paths",
     ),
     (
         "veduta::atmosphere::orders::order_moments",
@@ -431,6 +439,18 @@ impl Answer for AirRay {
             self.dark_to,
             f64::from(self.meets_ground),
         ])
+    }
+}
+
+impl Answer for SphereNode {
+    fn values(self) -> Values {
+        Values::new(&[self.mu, self.cos_phi, self.solid])
+    }
+}
+
+impl Answer for TopPath {
+    fn values(self) -> Values {
+        Values::new(&[self.lowest, self.along, self.rises, self.falls])
     }
 }
 
@@ -1262,15 +1282,28 @@ pub fn registry() -> Vec<Entry> {
         horizon_cosine,
         column_coordinates,
         column_place,
+        path_to_top,
         texture_place,
         texel_coordinates,
         sun_above_horizon
     );
     other!(
         list,
+        "atmosphere::irradiance::sphere_node",
+        "air_tables::sphere_node",
+        air_tables::sphere_node
+    );
+    other!(
+        list,
         "atmosphere::columns::column_scale",
         "air_tables::column_scale",
         |air: Air, h: f64, mu: f64| air_tables::column_scale(air.0, h, mu)
+    );
+    other!(
+        list,
+        "atmosphere::columns::column_code",
+        "air_tables::column_code",
+        |air: Air, h: f64, mu: f64| air_tables::column_code(air.0, h, mu)
     );
     other!(
         list,
@@ -1705,7 +1738,10 @@ fn particular(entry: Entry) -> Entry {
                 .branch("mu", &[level(3e6), level(1e8)])
         }
         ("atmosphere::columns", "column_scale") => entry.lin("h", 0.0, 5e4),
-        ("atmosphere::columns", "columns_to_top") => entry
+        ("atmosphere::columns", "path_to_top") => entry
+            .lin("h", 0.0, 5e4)
+            .branch("mu", &[-0.1, -0.01, -1e-3, 1e-3, 0.01]),
+        ("atmosphere::columns", "columns_to_top" | "column_code") => entry
             .lin("h", 0.0, 5e4)
             .branch("h", &[100.0, 1e3, 1e4])
             .branch("mu", &[-0.1, -0.01, -1e-3, 1e-3, 0.01])
