@@ -11,6 +11,7 @@ mod query;
 pub mod ray;
 mod sky;
 mod tables;
+mod transmittance;
 
 pub use fast::FastProbe;
 pub use medium::{
@@ -23,3 +24,4 @@ pub use query::{LightPlace, PlaceLight, SkyQuery};
 pub use ray::AirRay;
 pub use sky::{Sky, SkyComposition, SkyOptions};
 pub use tables::{Eye, SkyQuality, SkyTables};
+pub use transmittance::TransmittanceTable;

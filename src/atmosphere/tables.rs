@@ -141,13 +141,13 @@ impl Eye {
 
 /// A texture with a view of all of it.
 #[derive(Debug)]
-struct Table {
-    texture: wgpu::Texture,
-    view: wgpu::TextureView,
+pub(super) struct Table {
+    pub(super) texture: wgpu::Texture,
+    pub(super) view: wgpu::TextureView,
 }
 
 impl Table {
-    fn new(
+    pub(super) fn new(
         device: &wgpu::Device,
         label: &str,
         [width, height]: [u32; 2],
@@ -180,7 +180,7 @@ impl Table {
         Table { texture, view }
     }
 
-    fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         let size = self.texture.size();
         8 * u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers)
     }
@@ -188,14 +188,14 @@ impl Table {
 
 /// A pass over a table.
 #[derive(Debug)]
-struct Bake {
-    pipeline: wgpu::ComputePipeline,
-    groups: Vec<wgpu::BindGroup>,
-    workgroups: [u32; 2],
+pub(super) struct Bake {
+    pub(super) pipeline: wgpu::ComputePipeline,
+    pub(super) groups: Vec<wgpu::BindGroup>,
+    pub(super) workgroups: [u32; 2],
 }
 
 impl Bake {
-    fn record(&self, encoder: &mut wgpu::CommandEncoder, label: &str, work: &mut Work) {
+    pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, label: &str, work: &mut Work) {
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some(label),
             ..Default::default()
@@ -211,7 +211,7 @@ impl Bake {
 }
 
 /// Writes a buffer when its bytes have changed.
-fn upload(
+pub(super) fn upload(
     queue: &wgpu::Queue,
     buffer: &wgpu::Buffer,
     held: &mut Vec<u8>,

@@ -132,6 +132,24 @@ pub fn sun_depth(air: &Atmosphere, h: f64, mu: f64) -> [f64; 3] {
     super::medium::air_extinction(air, columns_to_top(air, h, mu))
 }
 
+/// Coordinates in the table of transmittance; below the horizon those of the horizon.
+pub fn transmittance_coordinates(ground_radius: f64, top: f64, h: f64, mu: f64) -> [f64; 2] {
+    let horizon = horizon_cosine(ground_radius, h);
+    [(mu - horizon) / (1.0 - horizon), h / top].map(|share| share.clamp(0.0, 1.0).sqrt())
+}
+
+/// Altitude and zenith cosine of coordinates in the table of transmittance.
+pub fn transmittance_place(ground_radius: f64, top: f64, place: [f64; 2]) -> [f64; 2] {
+    let h = top * place[1] * place[1];
+    let horizon = horizon_cosine(ground_radius, h);
+    [h, horizon + (1.0 - horizon) * place[0] * place[0]]
+}
+
+/// The texel of the table of transmittance.
+pub fn transmittance_code(air: &Atmosphere, h: f64, mu: f64) -> [f64; 3] {
+    sun_depth(air, h, mu).map(|depth| (-0.5 * depth).exp())
+}
+
 /// Place of coordinates in a texture whose outermost texels' centres are 0 and 1.
 pub fn texture_place(coordinates: [f64; 2], size: [f64; 2]) -> [f64; 2] {
     std::array::from_fn(|k| (coordinates[k] * (size[k] - 1.0) + 0.5) / size[k])

@@ -4,7 +4,7 @@
 use crate::common::{Random, centile, errors, evaluator, gpu, heading, left, light, named};
 use veduta::atmosphere::{
     AirRay, Eye, FastProbe, LightPlace, Orders, ProbeLight, ProbeRay, SkyQuality, SkyQuery,
-    SkyTables,
+    SkyTables, TransmittanceTable,
 };
 use veduta::reference::probe::{Effort, Probed, probe};
 use veduta::reference::sky::Sky;
@@ -898,4 +898,85 @@ fn slices_and_distances_come_back() {
     }
     println!("slices: {worst:.1e}");
     assert!(worst < 4e-4);
+}
+
+/// A half-precision number.
+fn half(bits: u16) -> f64 {
+    let (exponent, digits) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
+    let magnitude = match exponent {
+        0 => digits * 2_f64.powi(-24),
+        _ => (1.0 + digits / 1024.0) * 2_f64.powi(exponent - 15),
+    };
+    if bits >> 15 == 1 {
+        -magnitude
+    } else {
+        magnitude
+    }
+}
+
+#[test]
+fn transmittance_of_the_table_meets_quadrature() {
+    let gpu = gpu();
+    let size = [128, 64];
+    let random = &mut Random(31);
+    for name in ["earth", "thesis", "hazy", "afra", "mars"] {
+        let air = named(name);
+        let mut table =
+            TransmittanceTable::new(&gpu.device, veduta::programs(), &air, size).unwrap();
+        let mut prepare = |air: &Atmosphere| {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let work = table.prepare(&gpu.queue, &mut encoder, air).unwrap();
+            gpu.queue.submit([encoder.finish()]);
+            work.bakes
+        };
+        assert_eq!([prepare(&air), prepare(&air)], [1, 0], "made once");
+        let mut thicker = air.clone();
+        thicker.thickness += 1.0;
+        assert_eq!([prepare(&thicker), prepare(&air)], [1, 1]);
+        let texels: Vec<f64> = gpu
+            .read_texture(table.texture())
+            .unwrap()
+            .chunks_exact(2)
+            .map(|b| half(u16::from_le_bytes([b[0], b[1]])))
+            .collect();
+        // Read as a linear sampler that clamps does.
+        let read = |h: f64, mu: f64, c: usize| {
+            let at = air_tables::transmittance_coordinates(air.planet_radius, air.thickness, h, mu);
+            let at = [0, 1].map(|k| at[k] * f64::from(size[k] - 1));
+            let near = [0, 1].map(|k| (at[k] as u32).min(size[k] - 2));
+            let share = [0, 1].map(|k| at[k] - f64::from(near[k]));
+            let texel = |x: u32, y: u32| texels[4 * (size[0] * y + x) as usize + c];
+            let row =
+                |y: u32| texel(near[0], y) * (1.0 - share[0]) + texel(near[0] + 1, y) * share[0];
+            let code = row(near[1]) * (1.0 - share[1]) + row(near[1] + 1) * share[1];
+            code * code
+        };
+        let mut off = Vec::new();
+        for _ in 0..4000 {
+            let place = [0, 1].map(|_| random.uniform(0.0, 1.0));
+            let [h, mu] = air_tables::transmittance_place(air.planet_radius, air.thickness, place);
+            let back =
+                air_tables::transmittance_coordinates(air.planet_radius, air.thickness, h, mu);
+            assert!((0..2).all(|k| (back[k] - place[k]).abs() < 1e-6));
+            let h = air.thickness * random.uniform(0.0, 1.0).powi(2);
+            let horizon = air_tables::horizon_cosine(air.planet_radius, h);
+            let mu = horizon + (1.0 - horizon) * random.uniform(0.0, 1.0).powi(2);
+            let depth = air_tables::sun_depth(&air, h, mu);
+            for (c, depth) in depth.iter().enumerate() {
+                off.push(((read(h, mu, c) - (-depth).exp()).abs(), 0));
+            }
+        }
+        off.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (most, worst) = (centile(&off, 0.99), centile(&off, 1.0));
+        println!("{name}: 99th centile {most:.5}, worst {worst:.5}");
+        assert!(most < 5e-3 && worst < 0.03);
+    }
+    let refused = |size| {
+        TransmittanceTable::new(&gpu.device, veduta::programs(), &named("earth"), size).unwrap_err()
+    };
+    let fault = refused([1, 64]).to_string();
+    assert!(
+        fault.contains("size") && fault.contains("[2, 1024]"),
+        "{fault}"
+    );
 }

@@ -34,6 +34,16 @@ pub struct SkyArgs {
         allow_hyphen_values = true
     )]
     pub sun_height: Vec<f64>,
+    /// A day from midnight to midnight in so many pictures, 2 to 1440, instead of heights: the sun moves as at --latitude and --declination. With
+    /// `%d` in --out a file each, numbered from 0
+    #[arg(long, value_name = "COUNT", conflicts_with_all = ["sun_height", "sun_azimuth"])]
+    pub day: Option<u32>,
+    /// Latitude of the day in degrees
+    #[arg(long, default_value_t = 45.0, allow_negative_numbers = true)]
+    pub latitude: f64,
+    /// Declination of the sun on that day in degrees, -23.45 to 23.45 on Earth
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub declination: f64,
     /// Azimuth of the sun in degrees, clockwise from -z
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub sun_azimuth: f64,
@@ -57,6 +67,19 @@ pub struct SkyArgs {
     pub out: PathBuf,
 }
 
+/// Height and azimuth of the sun in degrees, clockwise from -z that is north, at an hour angle from noon in radians.
+fn sun_of_day(latitude: f64, declination: f64, hour: f64) -> [f64; 2] {
+    let (latitude, declination) = (latitude.to_radians(), declination.to_radians());
+    let up = latitude.sin() * declination.sin() + latitude.cos() * declination.cos() * hour.cos();
+    let north =
+        latitude.cos() * declination.sin() - latitude.sin() * declination.cos() * hour.cos();
+    let east = -declination.cos() * hour.sin();
+    [
+        up.clamp(-1.0, 1.0).asin().to_degrees(),
+        east.atan2(north).to_degrees(),
+    ]
+}
+
 /// The exposure with which a bright part of the picture (the 80th centile of the brightest channel) is shown at a displayed 0.75.
 fn exposure_of(rgb: &[f32]) -> f64 {
     let mut brightest: Vec<f32> = rgb
@@ -69,8 +92,8 @@ fn exposure_of(rgb: &[f32]) -> f64 {
     }
     brightest.sort_by(f32::total_cmp);
     let bright = brightest[(brightest.len() - 1) * 8 / 10];
-    // 1 - exp(-x) is about 0.52 in linear light, which is displayed at 0.75.
-    0.74 / f64::from(bright.max(1e-20))
+    // 1 - exp(-x) is about 0.52 in linear light, which is displayed at 0.75. Night stays night: what the last twilight leaves is not lit up.
+    (0.74 / f64::from(bright.max(1e-20))).min(1e8)
 }
 
 /// Runs the command.
@@ -105,6 +128,24 @@ pub fn run(args: &SkyArgs) -> Result<(), CliError> {
     if let Some(exposure) = args.exposure {
         within("--exposure", exposure, 0.0, 1e12)?;
     }
+    within("--latitude", args.latitude, -90.0, 90.0)?;
+    within("--declination", args.declination, -90.0, 90.0)?;
+    let suns: Vec<[f64; 2]> = match args.day {
+        Some(count) => {
+            within("--day", f64::from(count), 2.0, 1440.0)?;
+            (0..count)
+                .map(|k| {
+                    let hour = std::f64::consts::TAU * (f64::from(k) / f64::from(count) - 0.5);
+                    sun_of_day(args.latitude, args.declination, hour)
+                })
+                .collect()
+        }
+        None => args
+            .sun_height
+            .iter()
+            .map(|height| [*height, args.sun_azimuth])
+            .collect(),
+    };
     let gpu = veduta::device::shared()?;
     let options = SkyOptions {
         preset: Preset::Named(args.preset.clone().into()),
@@ -121,8 +162,8 @@ pub fn run(args: &SkyArgs) -> Result<(), CliError> {
     let texture = picture(&gpu.device, args.size, format);
     let target = texture.create_view(&Default::default());
     let mut pictures = Vec::new();
-    for sun_height in &args.sun_height {
-        let to_sun = direction(sun_height.to_radians(), args.sun_azimuth.to_radians());
+    for [sun_height, sun_azimuth] in suns {
+        let to_sun = direction(sun_height.to_radians(), sun_azimuth.to_radians());
         let mut view = View {
             eye: WorldPos::from_metres(DVec3::new(0.0, args.altitude, 0.0)),
             sun: Light {
@@ -163,28 +204,32 @@ pub fn run(args: &SkyArgs) -> Result<(), CliError> {
         pictures.push(rgb);
     }
     let (w, h) = (width as usize, height as usize);
-    let count = pictures.len();
+    let shown = |rgb: Vec<f32>| {
+        let exposure = args.exposure.unwrap_or_else(|| exposure_of(&rgb));
+        Ok::<_, CliError>(Picture::new(w, h, rgb)?.display(exposure))
+    };
+    let name = args.out.to_string_lossy().into_owned();
+    if args.day.is_some() && name.contains("%d") {
+        let digits = (pictures.len() - 1).to_string().len();
+        for (k, rgb) in pictures.into_iter().enumerate() {
+            let file = PathBuf::from(name.replace("%d", &format!("{k:0digits$}")));
+            if exr {
+                write_exr(&file, width, height, &rgb)?;
+            } else {
+                write_png(&file, width, height, &shown(rgb)?)?;
+            }
+        }
+        return Ok(());
+    }
+    let count = pictures.len() as u32;
     if exr {
-        return write_exr(
-            &args.out,
-            width * count as u32,
-            height,
-            &beside(&pictures, w, h),
-        );
+        return write_exr(&args.out, width * count, height, &beside(&pictures, w, h));
     }
     let shown = pictures
         .into_iter()
-        .map(|rgb| {
-            let exposure = args.exposure.unwrap_or_else(|| exposure_of(&rgb));
-            Ok(Picture::new(w, h, rgb)?.display(exposure))
-        })
+        .map(shown)
         .collect::<Result<Vec<Vec<u8>>, CliError>>()?;
-    write_png(
-        &args.out,
-        width * count as u32,
-        height,
-        &beside(&shown, w, h),
-    )
+    write_png(&args.out, width * count, height, &beside(&shown, w, h))
 }
 
 /// Pictures of one size side by side.
@@ -198,4 +243,21 @@ fn beside<T: Copy>(pictures: &[Vec<T>], width: usize, height: usize) -> Vec<T> {
         .flatten()
         .copied()
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::sun_of_day;
+
+    #[test]
+    fn the_sun_of_a_day_stands_where_spherical_triangles_say() {
+        // Noon in the south at 90 - latitude + declination; midnight in the north below the horizon.
+        let [height, azimuth] = sun_of_day(45.0, 20.0, 0.0);
+        assert!((height - 65.0).abs() < 1e-9 && (azimuth.abs() - 180.0).abs() < 1e-9);
+        let [height, azimuth] = sun_of_day(45.0, 20.0, std::f64::consts::PI);
+        assert!((height + 25.0).abs() < 1e-9 && azimuth.abs() < 1e-9);
+        // On an equinox it rises in the east six hours before noon.
+        let [height, azimuth] = sun_of_day(50.0, 0.0, -std::f64::consts::FRAC_PI_2);
+        assert!(height.abs() < 1e-9 && (azimuth - 90.0).abs() < 1e-9);
+    }
 }

@@ -84,6 +84,10 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "single_scattering_from_tables_meets_quadrature",
     ),
     (
+        "veduta::atmosphere::transmittance::table_transmittance",
+        "transmittance_of_the_table_meets_quadrature",
+    ),
+    (
         "veduta::atmosphere::sky_view::sky_seen",
         "what_the_sky_draws_is_what_the_probe_finds",
     ),
@@ -1289,6 +1293,20 @@ pub fn registry() -> Vec<Entry> {
     );
     other!(
         list,
+        "atmosphere::transmittance::transmittance_code",
+        "air_tables::transmittance_code",
+        |air: Air, h: f64, mu: f64| air_tables::transmittance_code(air.0, h, mu)
+    );
+    same!(
+        list,
+        "atmosphere::transmittance",
+        "air_tables",
+        air_tables,
+        transmittance_coordinates,
+        transmittance_place
+    );
+    other!(
+        list,
         "atmosphere::irradiance::sphere_node",
         "air_tables::sphere_node",
         air_tables::sphere_node
@@ -1737,11 +1755,13 @@ fn particular(entry: Entry) -> Entry {
                 .lin("h", 0.0, 5e4)
                 .branch("mu", &[level(3e6), level(1e8)])
         }
-        ("atmosphere::columns", "column_scale") => entry.lin("h", 0.0, 5e4),
+        ("atmosphere::columns", "column_scale")
+        | ("atmosphere::transmittance", "transmittance_coordinates") => entry.lin("h", 0.0, 5e4),
         ("atmosphere::columns", "path_to_top") => entry
             .lin("h", 0.0, 5e4)
             .branch("mu", &[-0.1, -0.01, -1e-3, 1e-3, 0.01]),
-        ("atmosphere::columns", "columns_to_top" | "column_code") => entry
+        ("atmosphere::columns", "columns_to_top" | "column_code")
+        | ("atmosphere::transmittance", "transmittance_code") => entry
             .lin("h", 0.0, 5e4)
             .branch("h", &[100.0, 1e3, 1e4])
             .branch("mu", &[-0.1, -0.01, -1e-3, 1e-3, 0.01])
