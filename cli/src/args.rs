@@ -37,7 +37,7 @@ pub enum Command {
     Diff(commands::diff::DiffArgs),
     /// Evaluate a WGSL expression over rows of numbers on the device
     Eval(commands::eval::EvalArgs),
-    /// Find the light along given rays
+    /// Find the light along given rays, or heights of given places
     Probe(commands::probe::ProbeArgs),
 }
 

@@ -47,6 +47,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         ],
         "air_columns" | "air_diffuse" | "sky_view" | "sky_aerial" | "sky_probe" | "sky_query"
         | "probe" => &[&[]],
+        "terrain_heights" => return vec![BTreeSet::new()],
         _ => &[],
     };
     let set = |flags: &[&str]| flags.iter().map(|f| (*f).to_owned()).collect();

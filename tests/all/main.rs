@@ -8,6 +8,7 @@ mod common;
 mod downstream;
 mod eval;
 mod examples;
+mod field;
 mod fractal;
 mod getting_started;
 mod hash;

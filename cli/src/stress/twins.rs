@@ -4,6 +4,7 @@ use veduta::reference::air_ray::{self, AirRay};
 use veduta::reference::air_tables::{self, Moments, Scattered, SkyEye, SkyPlace, SplitPhases};
 use veduta::reference::atmosphere::{Atmosphere, SkyLight};
 use veduta::reference::clouds::{CloudLayer, CloudLight};
+use veduta::reference::field::{self, Field, Ground};
 use veduta::reference::fractal::warp;
 use veduta::reference::noise::{Lattice2d, Lattice3d, simplex, worley};
 use veduta::reference::phase::DropletPhase;
@@ -167,6 +168,20 @@ argument!(Terrain {
     gain: f64,
     smoothness: f64,
     seed: u32
+});
+argument!(Field {
+    cell: [i32; 2],
+    frac: [f64; 2],
+    wavelength: f64,
+    amplitude: f64,
+    base: f64,
+    fall: f64,
+    shape: f64,
+    detail: f64,
+    octaves: i32,
+    seed: u32,
+    mean: [f64; 4],
+    lost: [f64; 4]
 });
 argument!(Rock {
     cell: [i32; 3],
@@ -432,6 +447,13 @@ impl Answer for TerrainHit {
             self.clearance,
             f64::from(self.steps),
         ])
+    }
+}
+
+impl Answer for Ground {
+    fn values(self) -> Values {
+        let [x, z] = self.slope;
+        Values::new(&[self.height, x, z, self.lost])
     }
 }
 
@@ -1400,6 +1422,14 @@ pub fn registry() -> Vec<Entry> {
     );
     other!(
         list,
+        "terrain::field::ground_at",
+        "field::ground",
+        |field: Field, kind: i32, offset: [f64; 2], footprint: f64| {
+            field::ground(&field, kind, offset, footprint)
+        }
+    );
+    other!(
+        list,
         "terrain::march::ray_clearance",
         "terrain::ray_clearance",
         |land: Terrain, radius: f64, eye: f64, dir: [f64; 3], t: f64, octaves: i32| {
@@ -1761,6 +1791,20 @@ fn particular(entry: Entry) -> Entry {
             .lin("front.in_scatter", 0.0, 10.0)
             .lin("front.transmittance", 0.0, 1.0),
         ("terrain::height", _) => entry.terrain().weight(20.0),
+        ("terrain::field", _) => entry
+            .lin("field.cell", -2_147_483_648.0, 2_147_483_647.0)
+            .lin("field.frac", 0.0, 1.0)
+            .log("field.wavelength", 8192.0, 65536.0)
+            .lin("field.amplitude", 1.0, 1400.0)
+            .lin("field.base", -1000.0, 1000.0)
+            .lin("field.fall", 0.3, 0.5)
+            .lin("field.shape", 1.0, 2.0)
+            .lin("field.detail", 0.0, 1.0)
+            .lin("field.octaves", 1.0, 12.0)
+            .lin("field.mean", 0.1, 0.5)
+            .lin("field.lost", 0.1, 0.5)
+            .judged(&["height"])
+            .weight(60.0),
         ("terrain::march", "ray_clearance") => entry.terrain().unit("dir").weight(20.0),
         ("terrain::march", "march_constant") => entry
             .terrain()
