@@ -53,8 +53,11 @@ pub fn kept(wavelength: f64, footprint: f64) -> f64 {
     x * x * (3.0 - 2.0 * x)
 }
 
-/// What is left of a series after so many of its terms.
-fn remainder([total, first, ratio, _]: [f64; 4], terms: i32) -> f64 {
+/// What is left of a series after so many of its terms; the hybrid's is a geometric sequence.
+fn remainder(kind: i32, [total, first, ratio, _]: [f64; 4], terms: i32) -> f64 {
+    if kind == 1 {
+        return total * ratio.powi(terms);
+    }
     total - (0..terms).map(|i| first * ratio.powi(i)).sum::<f64>()
 }
 
@@ -171,10 +174,10 @@ pub fn ground(field: &Field, kind: i32, offset: [f64; 2], footprint: f64) -> Gro
         if k == field.octaves {
             return (sum, 0.0);
         }
-        let (rest, bend) = (remainder(field.mean, k), field.mean[3]);
+        let (rest, bend) = (remainder(kind, field.mean, k), field.mean[3]);
         let value = sum[0] + rest * w[0] * (1.0 + bend * (1.0 - w[0]));
         let slope = rest * (1.0 + bend * (1.0 - 2.0 * w[0]));
-        let lost = remainder(field.lost, k).max(0.0) * w[0] * (1.0 + field.lost[3] * (1.0 - w[0]));
+        let lost = remainder(kind, field.lost, k).max(0.0) * w[0] * (1.0 + field.lost[3] * (1.0 - w[0]));
         (
             [value, sum[1] + slope * w[1], sum[2] + slope * w[2]],
             lost,

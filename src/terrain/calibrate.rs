@@ -78,7 +78,7 @@ impl Curve {
     }
 }
 
-/// The geometric series that comes closest to sums, and the mean bend.
+/// The geometric series that comes closest to sums, relative to their size, and the mean bend.
 fn fit(sums: &[Curve]) -> Tail {
     let ends: Vec<f64> = sums.iter().map(|c| c.0[GRID - 1]).collect();
     if ends[0].abs() < 1e-9 {
@@ -93,14 +93,14 @@ fn fit(sums: &[Curve]) -> Tail {
             .collect();
         let (mut top, mut bottom) = (0.0, 0.0);
         for (s, e) in shape.iter().zip(&ends) {
-            // Squares over size: neither the largest sums alone count, nor the smallest.
-            (top, bottom) = (top + s, bottom + s * s / e);
+            let x = s / e;
+            (top, bottom) = (top + x, bottom + x * x);
         }
         let first = top / bottom;
         let error: f64 = shape
             .iter()
             .zip(&ends)
-            .map(|(s, e)| (first * s - e).powi(2) / e)
+            .map(|(s, e)| (first * s / e - 1.0).powi(2))
             .sum();
         if error < best.0 {
             let total = first * shape[0];
@@ -121,6 +121,25 @@ fn fit(sums: &[Curve]) -> Tail {
     Tail {
         bend: bends.sum::<f64>() / count as f64,
         ..best.1
+    }
+}
+
+/// The geometric sequence through the first and a middle one of sums, and the mean bend.
+fn sequence(sums: &[Curve]) -> Tail {
+    let end = |k: usize| sums[k].0[GRID - 1];
+    let middle = (sums.len() - 1) / 2;
+    if end(0).abs() < 1e-9 || middle == 0 {
+        return Tail {
+            total: end(0),
+            ratio: 1.0,
+            ..Tail::default()
+        };
+    }
+    Tail {
+        total: end(0),
+        first: 0.0,
+        ratio: (end(middle) / end(0)).powf(1.0 / middle as f64),
+        bend: 4.0 * sums[0].at(0.5)[0] / end(0) - 2.0,
     }
 }
 
@@ -221,6 +240,12 @@ pub fn tails(field: &HeightField) -> Tails {
     }
     means.pop();
     losts.pop();
+    if let Kind::Hybrid { .. } = field.kind {
+        return Tails {
+            mean: sequence(&means),
+            lost: sequence(&losts),
+        };
+    }
     let (mut mean, mut lost) = (fit(&means), fit(&losts));
     if let Kind::Craters { .. } = field.kind {
         // There is no weight.

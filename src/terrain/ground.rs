@@ -202,8 +202,13 @@ impl<T: Real> Prepared<T> {
             for k in 0..3 {
                 sum[k] += term[k];
             }
-            tail -= tail_step;
-            rough -= rough_step;
+            if let Kind::Hybrid { .. } = self.kind {
+                tail *= self.mean[2];
+                rough *= self.lost[2];
+            } else {
+                tail -= tail_step;
+                rough -= rough_step;
+            }
             tail_step *= self.mean[2];
             rough_step *= self.lost[2];
             frequency *= two;

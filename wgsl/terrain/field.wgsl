@@ -145,8 +145,14 @@ fn octave_sum(field: Field, kind: i32, start: Lattice2d, footprint: f32) -> Grou
             term *= amplitude;
         }
         sum += term;
-        tail -= tail_step;
-        rough -= rough_step;
+        if kind == FIELD_HYBRID {
+            // Weights shrink so fast there that the first octave left is nearly all: a geometric sequence, not a sum.
+            tail *= field.mean.z;
+            rough *= field.lost.z;
+        } else {
+            tail -= tail_step;
+            rough -= rough_step;
+        }
         tail_step *= field.mean.z;
         rough_step *= field.lost.z;
         frequency *= 2.0;
