@@ -237,3 +237,44 @@ fn mix(field: &Field, cell: [i32; 2], frac: [f64; 2], footprint: f64) -> Ground 
     let lost = 0.01 * power * power * fine[3] + bend * bend * middle[3] + coarse[3];
     scaled(field, value, lost)
 }
+
+/// A hit with the ground where the last step to it began.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refined {
+    /// Distance.
+    pub distance: f64,
+    /// Upward unit normal.
+    pub normal: [f64; 3],
+    /// The field there.
+    pub ground: Ground,
+}
+
+/// One step of Newton's method from a distance `t` towards the field, by at most `most`.
+#[allow(clippy::too_many_arguments)]
+pub fn refined(
+    field: &Field,
+    kind: i32,
+    ground_radius: f64,
+    eye_altitude: f64,
+    origin: [f64; 3],
+    dir: [f64; 3],
+    t: f64,
+    pixel_angle: f64,
+    most: f64,
+) -> Refined {
+    use super::math::{add, dot, normalize, scale};
+    use super::planet::{altitude_of, up_at};
+    let at = add(origin, scale(dir, t));
+    let here = ground(field, kind, [at[0], at[2]], pixel_angle * t);
+    let clearance = altitude_of(ground_radius, eye_altitude, at) - here.height;
+    let gradient = add(
+        up_at(ground_radius, eye_altitude, at),
+        [-here.slope[0], 0.0, -here.slope[1]],
+    );
+    let fall = (-dot(gradient, dir)).max(0.02);
+    Refined {
+        distance: (t + (clearance / fall).clamp(-most, most)).max(0.0),
+        normal: normalize(gradient),
+        ground: here,
+    }
+}

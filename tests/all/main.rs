@@ -12,6 +12,7 @@ mod field;
 mod fractal;
 mod getting_started;
 mod hash;
+mod land;
 mod landscape;
 mod noise;
 mod periodic;

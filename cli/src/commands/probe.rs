@@ -6,7 +6,7 @@ use veduta::Atmosphere;
 use veduta::atmosphere::{Orders, ProbeOptions, ProbePath, ProbeRay, SkyQuality, probe};
 use veduta::eval::ResultKind;
 use veduta::reference;
-use veduta::terrain::Land;
+use veduta::terrain::{Land, RayPath, TerrainRay, ray_hits};
 use veduta::{Preset, Settings, WorldPos};
 
 use crate::error::CliError;
@@ -28,6 +28,39 @@ pub enum What {
     Sky(SkyArgs),
     /// Heights of a land at given places
     Height(HeightArgs),
+    /// Where rays meet a land
+    Terrain(TerrainArgs),
+}
+
+/// How rays are followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Follow {
+    /// In double precision on the processor, by bracketing
+    Reference,
+    /// On the device, by steps in proportion to the clearance
+    Textbook,
+    /// On the device, over baked heights
+    Fast,
+}
+
+/// Arguments of `veduta probe terrain`.
+#[derive(Debug, Clone, clap::Args)]
+pub struct TerrainArgs {
+    /// A shipped land or a .ron file
+    #[arg(long, value_name = "NAME|FILE", default_value = "thesis")]
+    pub scene: String,
+    /// The rays, .npy or .csv: origin, unit direction, largest distance
+    #[arg(long, value_name = "ROWS")]
+    pub rays: PathBuf,
+    /// How rays are followed
+    #[arg(long, value_enum, default_value = "fast")]
+    pub path: Follow,
+    /// Angle of a pixel in radians, in [1e-5, 0.1]: the footprint is the distance times this
+    #[arg(long, value_name = "RAD", default_value = "0.004")]
+    pub pixel_angle: f32,
+    /// Where the hits go, .npy or .csv: distance, normal, height
+    #[arg(long, value_name = "HITS")]
+    pub out: PathBuf,
 }
 
 /// Where the heights are computed.
@@ -124,6 +157,7 @@ pub fn run(args: &ProbeArgs) -> Result<(), CliError> {
     match &args.what {
         What::Sky(args) => sky(args),
         What::Height(args) => height(args),
+        What::Terrain(args) => terrain(args),
     }
 }
 
@@ -141,6 +175,76 @@ pub fn land(name: &str) -> Result<Land, CliError> {
         path: path.to_owned(),
         what: e.to_string(),
     })
+}
+
+fn terrain(args: &TerrainArgs) -> Result<(), CliError> {
+    Format::of(&args.out)?;
+    check_folder(&args.out)?;
+    let land = land(&args.scene)?;
+    if !(1e-5..=0.1).contains(&args.pixel_angle) {
+        return Err(CliError::argument(
+            "--pixel-angle",
+            args.pixel_angle.to_string(),
+            "in [1e-5, 0.1] rad",
+        ));
+    }
+    let fault = |what: String| CliError::Table {
+        path: args.rays.clone(),
+        what,
+    };
+    let numbers = Table::read(&args.rays, 7)?.to_numbers(&args.rays)?;
+    let mut rays = Vec::with_capacity(numbers.len() / 7);
+    for (row, [x, y, z, dx, dy, dz, far]) in numbers.as_chunks::<7>().0.iter().enumerate() {
+        if !(x.abs() <= 9e15 && z.abs() <= 9e15 && y.abs() <= 1e5) {
+            return Err(fault(format!(
+                "the origin of row {row} is ({x}, {y}, {z}), but must be within 9e15 m, and its altitude within 1e5 m"
+            )));
+        }
+        let length = (dx * dx + dy * dy + dz * dz).sqrt();
+        if !((length - 1.0).abs() <= 1e-3) {
+            return Err(fault(format!(
+                "the length of the direction of row {row} is {length}, but must be 1 to 1e-3"
+            )));
+        }
+        let ray = TerrainRay {
+            origin: WorldPos::from_metres([*x, *y, *z].into()),
+            dir: [dx / length, dy / length, dz / length],
+            far: *far,
+        };
+        ray.check(row).map_err(|e| fault(e.to_string()))?;
+        rays.push(ray);
+    }
+    let hits = match args.path {
+        Follow::Reference => {
+            let field = land.field.prepare::<f64>()?;
+            let top = land.field.bounds()?.maximum;
+            let angle = f64::from(args.pixel_angle);
+            rays.iter()
+                .map(|r| field.ray_hit(land.planet_radius, top, r, angle, 0.05))
+                .collect::<Result<Vec<_>, _>>()?
+        }
+        path => {
+            let path = if path == Follow::Fast {
+                RayPath::Fast
+            } else {
+                RayPath::Textbook
+            };
+            let gpu = veduta::device::shared()?;
+            ray_hits(gpu, veduta::programs(), &land, &rays, args.pixel_angle, path)?
+        }
+    };
+    let capped = hits.iter().filter(|h| h.capped).count();
+    if capped > 0 {
+        eprintln!("{capped} of {} rays ran out of steps", hits.len());
+    }
+    let found: Vec<u32> = hits
+        .iter()
+        .flat_map(|h| {
+            let [x, y, z] = h.normal;
+            [h.distance, x, y, z, h.height].map(|v| (v as f32).to_bits())
+        })
+        .collect();
+    write_results(&args.out, &found, 5, ResultKind::F32)
 }
 
 fn height(args: &HeightArgs) -> Result<(), CliError> {
