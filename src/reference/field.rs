@@ -249,7 +249,7 @@ pub struct Refined {
     pub ground: Ground,
 }
 
-/// One step of Newton's method from a distance `t` towards the field, by at most `most`.
+/// Steps of Newton's method from a distance `t` towards the field, by at most `most`.
 #[allow(clippy::too_many_arguments)]
 pub fn refined(
     field: &Field,
@@ -261,20 +261,33 @@ pub fn refined(
     t: f64,
     pixel_angle: f64,
     most: f64,
+    steps: i32,
 ) -> Refined {
     use super::math::{add, dot, normalize, scale};
     use super::planet::{altitude_of, up_at};
-    let at = add(origin, scale(dir, t));
-    let here = ground(field, kind, [at[0], at[2]], pixel_angle * t);
-    let clearance = altitude_of(ground_radius, eye_altitude, at) - here.height;
-    let gradient = add(
-        up_at(ground_radius, eye_altitude, at),
-        [-here.slope[0], 0.0, -here.slope[1]],
-    );
-    let fall = (-dot(gradient, dir)).max(0.02);
-    Refined {
-        distance: (t + (clearance / fall).clamp(-most, most)).max(0.0),
-        normal: normalize(gradient),
-        ground: here,
+    let mut found = Refined {
+        distance: t,
+        normal: [0.0, 1.0, 0.0],
+        ground: Ground {
+            height: 0.0,
+            slope: [0.0; 2],
+            lost: 0.0,
+        },
+    };
+    for _ in 0..steps {
+        let at = add(origin, scale(dir, found.distance));
+        let here = ground(field, kind, [at[0], at[2]], pixel_angle * found.distance);
+        let clearance = altitude_of(ground_radius, eye_altitude, at) - here.height;
+        let gradient = add(
+            up_at(ground_radius, eye_altitude, at),
+            [-here.slope[0], 0.0, -here.slope[1]],
+        );
+        let fall = (-dot(gradient, dir)).max(0.02);
+        found = Refined {
+            distance: (found.distance + clearance / fall).clamp((t - most).max(0.0), t + most),
+            normal: normalize(gradient),
+            ground: here,
+        };
     }
+    found
 }

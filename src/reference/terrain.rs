@@ -339,6 +339,27 @@ pub fn shade_three_lights(
     })
 }
 
+/// Light received by a surface of which only the mean slopes and the mean square about them are known.
+pub fn shade_rough(
+    lights: &ThreeLights,
+    slope: [f64; 2],
+    lost: f64,
+    to_sun: [f64; 3],
+    shadow: f64,
+) -> [f64; 3] {
+    let size = (1.0 + slope[0] * slope[0] + slope[1] * slope[1] + lost).sqrt();
+    let normal = [-slope[0] / size, 1.0 / size, -slope[1] / size];
+    let spread = 0.8 * (0.5 * lost).sqrt() / size;
+    let lit = |x: f64, width: f64| 0.5 * (x + x.hypot(width));
+    let direct = lit(dot(normal, to_sun), spread * to_sun[0].hypot(to_sun[2])) * shadow;
+    let bounce = lit(dot(normal, bounce_direction(to_sun)), spread);
+    std::array::from_fn(|k| {
+        direct * lights.sun_color[k]
+            + normal[1] * lights.sky_color[k]
+            + bounce * lights.bounce_color[k]
+    })
+}
+
 /// Scale, colours and place of the rock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rock {

@@ -138,6 +138,7 @@ impl Terrain {
             ("OUTPUT", output),
             ("MAX_MARCHING_STEPS", if low { 250.0 } else { 500.0 }),
             ("MAX_MARCHING_STEPS_SHADOW", if low { 24.0 } else { 60.0 }),
+            ("REFINE_STEPS", if low { 1.0 } else { 2.0 }),
             ("ROCK_CHEAP", f64::from(u8::from(low))),
         ];
         let ready = programs.get("terrain", &[])?.pipeline(

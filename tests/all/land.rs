@@ -99,3 +99,106 @@ fn rays_over_baked_heights_meet_the_field() {
         assert_eq!(capped, 0, "{name}");
     }
 }
+
+#[test]
+fn the_sun_shines_where_the_ground_lets_it() {
+    // A frame without sky light: black is shadow. Judged against the share of the sun's disc that rays of the reference reach.
+    use veduta::glam::Vec3;
+    use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
+    let land = Land::named("thesis").unwrap();
+    let rows = 36;
+    let columns = rows * 16 / 9;
+    let (rays, angle) = rays(&land, rows, 600.0, -10.0, [13_500.0, -14_700.0]);
+    let field = land.field.prepare::<f64>().unwrap();
+    let top = land.field.bounds().unwrap().maximum;
+    let gpu = gpu();
+    let targets = veduta::Targets {
+        color_format: wgpu::TextureFormat::Rgba32Float,
+        ..Default::default()
+    };
+    let options = TerrainOptions {
+        land: land.clone(),
+        far: 50_000.0,
+        ..Default::default()
+    };
+    let mut terrain = Terrain::new(&gpu.device, veduta::programs(), &targets, &options).unwrap();
+    let to_sun = direction(0.35, 1.9);
+    let mut view = veduta::View {
+        eye: rays[0].origin,
+        sun: veduta::Light {
+            to_light: to_sun.as_vec3(),
+            ..Default::default()
+        },
+        ..Default::default()
+    };
+    view.look(0.3, f64::to_radians(-10.0), 60_f32.to_radians(), 16.0 / 9.0);
+    let lights = TerrainLights {
+        sun: Vec3::splat(std::f32::consts::PI),
+        sky: Vec3::ZERO,
+        bounce: Vec3::ZERO,
+    };
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let work = terrain
+        .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+        .unwrap();
+    assert!(work.bakes > 0);
+    gpu.queue.submit([encoder.finish()]);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let again = terrain
+        .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+        .unwrap();
+    assert_eq!(again, Default::default(), "nothing is done twice");
+    let picture = crate::common::draw_with(
+        [columns as u32, rows as u32],
+        wgpu::TextureFormat::Rgba32Float,
+        |pass| {
+            let _ = terrain.draw_opaque(pass);
+        },
+    );
+    assert_eq!(picture.not_finite(), 0);
+    let (mut wrong, mut judged, mut lit, mut dark) = (0, 0, 0, 0);
+    for (i, ray) in rays.iter().enumerate() {
+        let hit = field
+            .ray_hit(land.planet_radius, top, ray, f64::from(angle), 0.05)
+            .unwrap();
+        if !hit.distance.is_finite() || hit.distance > 8000.0 {
+            continue;
+        }
+        let toward = (0..3)
+            .map(|k| hit.normal[k] * to_sun.to_array()[k])
+            .sum::<f64>();
+        if toward < 0.25 {
+            continue;
+        }
+        let footprint = f64::from(angle) * hit.distance;
+        let start: [f64; 3] =
+            std::array::from_fn(|k| ray.dir[k] * hit.distance + hit.normal[k] * footprint);
+        let from = TerrainRay {
+            origin: ray.origin.moved_by(start.into()),
+            dir: to_sun.to_array(),
+            far: 30_000.0,
+        };
+        // Towards both ends of the disc: where they differ there is penumbra, which is not judged.
+        let seen = |turn: f64| {
+            let dir = direction(0.35 + turn, 1.9).to_array();
+            let ray = TerrainRay { dir, ..from };
+            !field
+                .ray_hit(land.planet_radius, top, &ray, 0.004, footprint.max(1.0))
+                .unwrap()
+                .distance
+                .is_finite()
+        };
+        let (up, down) = (seen(0.04), seen(-0.04));
+        if up != down {
+            continue;
+        }
+        judged += 1;
+        lit += i32::from(up);
+        dark += i32::from(!up);
+        let bright = picture.pixels[i][0] > 0.02;
+        wrong += i32::from(bright != up);
+    }
+    println!("{wrong} of {judged} wrong, {lit} lit and {dark} dark");
+    assert!(lit > 100 && dark > 20);
+    assert!(f64::from(wrong) <= 0.02 * f64::from(judged));
+}

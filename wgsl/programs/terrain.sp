@@ -53,12 +53,12 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 
 #FRAGMENT{
     #CODE{
-#import veduta::planet::shell::{up_at, altitude_of}
+#import veduta::planet::shell::{altitude_of}
 #import veduta::terrain::clipmap::{Clip, clip_hit, clip_shadow, baked_height}
 #import veduta::terrain::field::{Field}
 #import veduta::terrain::refine::{refined_hit}
 #import veduta::terrain::material::{Rock, faded_noise, rock_low_faded, rock_high_faded, snow_blend}
-#import veduta::terrain::shading::{ThreeLights, shade_three_lights}
+#import veduta::terrain::shading::{ThreeLights, shade_rough}
 #import veduta::tone_map::exponential::{exponential}
 #import veduta::post::srgb::{encode_srgb, decode_srgb}
 #import veduta::post::dither::{dither}
@@ -77,6 +77,8 @@ override FIELD_KIND: i32 = 2;
 override OUTPUT: i32 = 0;
 override MAX_MARCHING_STEPS: i32 = 200;
 override MAX_MARCHING_STEPS_SHADOW: i32 = 60;
+// Steps from the baked ground to the field.
+override REFINE_STEPS: i32 = 2;
 // Whether the rock has one fractal instead of four.
 override ROCK_CHEAP: i32 = 0;
 
@@ -110,14 +112,13 @@ fn draw(in: Corner) -> Shown {
     // Where nothing is met the rest takes no rounds of any loop.
     let is_met = met >= 0.0;
     let pixel = select(1e30, angle, is_met);
-    let found = refined_hit(field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, vec3<f32>(0.0), dir, max(met, 1e-3), pixel, 2.0 * hit.spacing);
+    let found = refined_hit(field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, vec3<f32>(0.0), dir, max(met, 1e-3), pixel, 2.0 * hit.spacing, select(0, REFINE_STEPS, is_met));
     let point = dir * found.distance;
     let footprint = select(1e30, angle * found.distance, is_met);
-    let up = up_at(clip.ground_radius, clip.eye_altitude, point);
     let altitude = altitude_of(clip.ground_radius, clip.eye_altitude, point);
     // From where the baked ground is, which may be above the field.
     let lift = max(baked_height(heights, places, clip, point.xz, 0) - altitude, 0.0) + 0.3 * hit.spacing;
-    let facing = dot(found.normal, draw_view.to_sun);
+    let facing = dot(found.normal, draw_view.to_sun) + sqrt(found.ground.lost);
     let rounds = select(0, MAX_MARCHING_STEPS_SHADOW, is_met && facing > 0.0);
     let light = clip_shadow(heights, places, clip, point, draw_view.to_sun, draw_view.sun_width, lift, draw_view.far, rounds);
     let place = vec3<f32>(point.x, altitude, point.z);
@@ -128,10 +129,15 @@ fn draw(in: Corner) -> Shown {
         albedo = rock_high_faded(rock, place, footprint);
     }
     let border = faded_noise(rock, place, vec3<i32>(1, 1, 1), 7u, footprint);
-    let snow = snow_blend(dot(found.normal, up), border, draw_view.snow_edge_low, draw_view.snow_edge_high, draw_view.snow_noise);
+    // Slopes that are not resolved make the ground steeper than it looks, and the border of the snow wider.
+    let slope = found.ground.slope;
+    let lost = found.ground.lost;
+    let level = inverseSqrt(1.0 + dot(slope, slope) + lost);
+    let blur = 0.5 * level * level * sqrt(lost * (1.0 - level * level));
+    let snow = snow_blend(level, border, draw_view.snow_edge_low - blur, draw_view.snow_edge_high + blur, draw_view.snow_noise);
     albedo = mix(albedo, draw_view.snow_albedo, snow);
     let lights = ThreeLights(draw_view.sun_light, draw_view.sky_light, draw_view.bounce_light);
-    let radiance = INVERSE_PI * albedo * shade_three_lights(lights, found.normal, draw_view.to_sun, light);
+    let radiance = INVERSE_PI * albedo * shade_rough(lights, slope, lost, draw_view.to_sun, light);
     if !is_met {
         discard;
     }

@@ -61,7 +61,7 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     let capped = hit.steps == MAX_MARCHING_STEPS && hit.distance < 0.0;
     // A ray that ran out of steps on its way down has almost met it.
     let met = select(hit.distance, hit.reached, capped && hit.clearance < 0.05 * hit.reached);
-    let found = refined_hit(field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, ray.origin, ray.dir, max(met, 0.0), ray.pixel_angle, 2.0 * hit.spacing);
+    let found = refined_hit(field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, ray.origin, ray.dir, max(met, 0.0), ray.pixel_angle, 2.0 * hit.spacing, 3);
     results[id.x] = HitRow(select(found.distance, -1.0, met < 0.0), found.normal, found.ground.height, select(hit.steps, -1, capped));
 #else
     var t = 0.0;

@@ -12,11 +12,11 @@ struct RefinedHit {
     distance: f32,
     /// Upward unit normal in the eye's frame.
     normal: vec3<f32>,
-    /// The field at the place that the step started from.
+    /// The field at the place that the last step started from.
     ground: Ground,
 }
 
-/// A hit moved onto the field, by at most `most` metres.
+/// A hit moved onto the field, by at most `most` metres, in so many steps.
 ///
 /// domain  kind in [0, 4] 1 lin
 /// domain  ground_radius in [3e6, 1e8] m log
@@ -26,18 +26,23 @@ struct RefinedHit {
 /// domain  t in [0, 1e5] m lin
 /// domain  pixel_angle in [1e-5, 0.1] 1 log
 /// domain  most in [0, 1e4] m lin
+/// domain  steps in [0, 4] 1 lin
 /// range   [-1e5, 2e5] 1
 /// error   1 abs of reference::field::refined
 /// outside undefined
-/// source  Newton's method, one step
-fn refined_hit(field: Field, kind: i32, ground_radius: f32, eye_altitude: f32, origin: vec3<f32>, dir: vec3<f32>, t: f32, pixel_angle: f32, most: f32) -> RefinedHit {
-    let at = origin + dir * t;
-    let ground = ground_at(field, kind, at.xz, pixel_angle * t);
-    let up = up_at(ground_radius, eye_altitude, at);
-    let clearance = altitude_of(ground_radius, eye_altitude, at) - ground.height;
-    let gradient = up - vec3<f32>(ground.slope.x, 0.0, ground.slope.y);
-    // The clearance falls along a ray that meets the ground.
-    let fall = max(-dot(gradient, dir), 0.02);
-    let distance = max(t + clamp(clearance / fall, -most, most), 0.0);
+/// source  Newton's method
+fn refined_hit(field: Field, kind: i32, ground_radius: f32, eye_altitude: f32, origin: vec3<f32>, dir: vec3<f32>, t: f32, pixel_angle: f32, most: f32, steps: i32) -> RefinedHit {
+    var distance = t;
+    var ground = Ground(0.0, vec2<f32>(0.0), 0.0);
+    var gradient = vec3<f32>(0.0, 1.0, 0.0);
+    for (var i = 0; i < steps; i++) {
+        let at = origin + dir * distance;
+        ground = ground_at(field, kind, at.xz, pixel_angle * distance);
+        gradient = up_at(ground_radius, eye_altitude, at) - vec3<f32>(ground.slope.x, 0.0, ground.slope.y);
+        let clearance = altitude_of(ground_radius, eye_altitude, at) - ground.height;
+        // The clearance falls along a ray that meets the ground.
+        let fall = max(-dot(gradient, dir), 0.02);
+        distance = clamp(distance + clearance / fall, max(t - most, 0.0), t + most);
+    }
     return RefinedHit(distance, gradient * inverseSqrt(max(dot(gradient, gradient), 1e-12)), ground);
 }

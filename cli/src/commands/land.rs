@@ -11,6 +11,7 @@ use veduta::{Light, Preset, Targets, View, WorldPos};
 
 use super::probe::{atmosphere, land};
 use super::sky::exposure_of;
+use crate::cpu::CpuTime;
 use crate::error::CliError;
 use crate::image::{check_folder, check_output, write_exr, write_png};
 use crate::metrics::Picture;
@@ -58,6 +59,9 @@ pub struct LandArgs {
     /// Factor on radiance before the tone map; found from the picture when left out
     #[arg(long)]
     pub exposure: Option<f64>,
+    /// Frames whose processor time is printed, of a flight at 100 m/s with 30 frames a second; the picture is the last
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    pub frames: u32,
     /// The picture, .png or .exr (radiance for a sun of irradiance 1, not exposed)
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
@@ -196,9 +200,19 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
     );
     let [picture_view, shown_view, depth_view] =
         [&picture, &shown, &depth].map(|t| t.create_view(&Default::default()));
-    let mut encoder = device.create_command_encoder(&Default::default());
-    let _ = terrain.prepare(queue, &mut encoder, &view, &lights, height)?;
-    {
+    let finish = |encoder: wgpu::CommandEncoder| -> Result<(), CliError> {
+        queue.submit([encoder.finish()]);
+        device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|e| veduta::Error::Device(e.to_string()))?;
+        Ok(())
+    };
+    let now = CpuTime::now;
+    let since = |before: Option<CpuTime>| match (before, now()) {
+        (Some(before), Some(after)) => after.since(&before),
+        _ => f64::NAN,
+    };
+    let draw = |encoder: &mut wgpu::CommandEncoder, terrain: &Terrain| {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: &picture_view,
@@ -217,7 +231,38 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
             ..Default::default()
         });
         let _ = terrain.draw_opaque(&mut pass);
+    };
+    // The first frame bakes everything and compiles; the flight then shows what a frame costs.
+    let (mut bakes, mut draws) = (Vec::new(), Vec::new());
+    for frame in 0..args.frames {
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let _ = terrain.prepare(queue, &mut encoder, &view, &lights, height)?;
+        let before = now();
+        finish(encoder)?;
+        bakes.push(since(before));
+        let mut encoder = device.create_command_encoder(&Default::default());
+        draw(&mut encoder, &terrain);
+        let before = now();
+        finish(encoder)?;
+        draws.push(since(before));
+        if frame + 1 < args.frames {
+            view.eye = view
+                .eye
+                .moved_by(direction(0.0, args.yaw.to_radians()) * (100.0 / 30.0));
+        }
     }
+    if let Some((first, others)) = bakes.split_first() {
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
+        println!(
+            "processor ms a frame: {:.2} drawn, {:.2} baked; the first bake {first:.0}; {} bytes on the device",
+            mean(draws.get(1..).unwrap_or_default()),
+            mean(others),
+            terrain.resources().texture_bytes,
+        );
+    }
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let _ = terrain.prepare(queue, &mut encoder, &view, &lights, height)?;
+    draw(&mut encoder, &terrain);
     if let Some(sky) = &mut sky {
         sky.set_host(device, &depth_view, Some(&picture_view))?;
         let _ = sky.prepare(queue, &mut encoder, &view)?;

@@ -1474,8 +1474,11 @@ pub fn registry() -> Vec<Entry> {
          dir: [f64; 3],
          t: f64,
          pixel: f64,
-         most: f64| {
-            field::refined(&field, kind, radius, eye, origin, dir, t, pixel, most)
+         most: f64,
+         steps: i32| {
+            field::refined(
+                &field, kind, radius, eye, origin, dir, t, pixel, most, steps,
+            )
         }
     );
     other!(
@@ -1612,6 +1615,14 @@ pub fn registry() -> Vec<Entry> {
         "terrain::shade_three_lights",
         |lights: ThreeLights, normal: [f64; 3], to_sun: [f64; 3], shadow: f64| {
             terrain::shade_three_lights(&lights, normal, to_sun, shadow)
+        }
+    );
+    other!(
+        list,
+        "terrain::shading::shade_rough",
+        "terrain::shade_rough",
+        |lights: ThreeLights, slope: [f64; 2], lost: f64, to_sun: [f64; 3], shadow: f64| {
+            terrain::shade_rough(&lights, slope, lost, to_sun, shadow)
         }
     );
     other!(
@@ -1869,6 +1880,7 @@ fn particular(entry: Entry) -> Entry {
         ("terrain::refine", _) => entry
             .field()
             .unit("dir")
+            .lin("steps", 1.0, 1.0)
             .judged(&["ground.height"])
             .weight(60.0),
         ("terrain::march", "ray_clearance") => entry.terrain().unit("dir").weight(20.0),
