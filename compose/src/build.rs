@@ -49,7 +49,9 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         | "probe" => &[&[]],
         "terrain" | "terrain_heights" => return vec![BTreeSet::new()],
         "terrain_bake" => return vec![BTreeSet::new(), BTreeSet::from(["CLIP_MAXIMA".to_owned()])],
-        "terrain_rays" => return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])],
+        "terrain_rays" => {
+            return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
+        }
         _ => &[],
     };
     let set = |flags: &[&str]| flags.iter().map(|f| (*f).to_owned()).collect();

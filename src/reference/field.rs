@@ -99,8 +99,7 @@ fn crater_octave(field: &Field, cell: [i32; 2], frac: [f64; 2], i: i32) -> [f64;
             sum[0] += radius * value;
             for k in 0..2 {
                 // The middle of a bowl is level.
-                sum[k + 1] +=
-                    octave_frequency(i) * slope * away[k] / distance.max(1e-12);
+                sum[k + 1] += octave_frequency(i) * slope * away[k] / distance.max(1e-12);
             }
         }
     }
@@ -158,16 +157,13 @@ fn first_octaves(
 
 /// The field at an offset (x, z) from the eye, filtered by a footprint.
 pub fn ground(field: &Field, kind: i32, offset: [f64; 2], footprint: f64) -> Ground {
-    let place: [f64; 2] =
-        std::array::from_fn(|k| field.frac[k] + offset[k] / field.wavelength);
+    let place: [f64; 2] = std::array::from_fn(|k| field.frac[k] + offset[k] / field.wavelength);
     let p = split_2d(field.cell, place);
     if kind == 4 {
         return mix(field, p.cell, p.frac, footprint);
     }
     let share = |i: i32| kept(field.wavelength / octave_frequency(i), footprint);
-    let whole = (0..field.octaves)
-        .take_while(|i| share(*i) >= 1.0)
-        .count() as i32;
+    let whole = (0..field.octaves).take_while(|i| share(*i) >= 1.0).count() as i32;
     // The mean over all that follows octave k, and the square of its slopes.
     let held = |k: i32| {
         let [sum, w] = first_octaves(field, kind, p.cell, p.frac, k);
@@ -177,11 +173,9 @@ pub fn ground(field: &Field, kind: i32, offset: [f64; 2], footprint: f64) -> Gro
         let (rest, bend) = (remainder(kind, field.mean, k), field.mean[3]);
         let value = sum[0] + rest * w[0] * (1.0 + bend * (1.0 - w[0]));
         let slope = rest * (1.0 + bend * (1.0 - 2.0 * w[0]));
-        let lost = remainder(kind, field.lost, k).max(0.0) * w[0] * (1.0 + field.lost[3] * (1.0 - w[0]));
-        (
-            [value, sum[1] + slope * w[1], sum[2] + slope * w[2]],
-            lost,
-        )
+        let lost =
+            remainder(kind, field.lost, k).max(0.0) * w[0] * (1.0 + field.lost[3] * (1.0 - w[0]));
+        ([value, sum[1] + slope * w[1], sum[2] + slope * w[2]], lost)
     };
     let (mut value, mut lost) = held(whole);
     if whole < field.octaves {

@@ -71,10 +71,7 @@ impl Curve {
         let x = weight * (GRID - 1) as f64;
         let i = (x.max(0.0) as usize).min(GRID - 2);
         let rise = self.0[i + 1] - self.0[i];
-        [
-            self.0[i] + rise * (x - i as f64),
-            rise * (GRID - 1) as f64,
-        ]
+        [self.0[i] + rise * (x - i as f64), rise * (GRID - 1) as f64]
     }
 }
 
@@ -124,10 +121,10 @@ fn fit(sums: &[Curve]) -> Tail {
     }
 }
 
-/// The geometric sequence through the first and a middle one of sums, and the mean bend.
+/// The geometric sequence through the first and the third of sums, and the mean bend.
 fn sequence(sums: &[Curve]) -> Tail {
     let end = |k: usize| sums[k].0[GRID - 1];
-    let middle = (sums.len() - 1) / 2;
+    let middle = (sums.len() - 1).min(2);
     if end(0).abs() < 1e-9 || middle == 0 {
         return Tail {
             total: end(0),

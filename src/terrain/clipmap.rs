@@ -374,9 +374,7 @@ impl Clipmap {
             if level < self.first {
                 continue;
             }
-            let corner = |cell: i64| {
-                (cell - self.texels / 2 + BLOCK / 2).div_euclid(BLOCK) * BLOCK
-            };
+            let corner = |cell: i64| (cell - self.texels / 2 + BLOCK / 2).div_euclid(BLOCK) * BLOCK;
             let window = [corner(x.0), corner(z.0)];
             if self.windows[level] == Some(window) {
                 continue;

@@ -299,9 +299,7 @@ impl HeightField {
                 slopes.extend(fine_slopes.iter().map(|s| s * 0.1 * lift));
             }
             Kind::Own { .. } => {
-                return Err(Error::NotYet(
-                    "bounds of a program's own height".to_owned(),
-                ));
+                return Err(Error::NotYet("bounds of a program's own height".to_owned()));
             }
         }
         let steepness = self.amplitude / self.lattice_wavelength();

@@ -222,10 +222,8 @@ impl<T: Real> Prepared<T> {
                 sum[1] + slope * weight[1],
                 sum[2] + slope * weight[2],
             ];
-            let after_lost = left
-                * rough.most(zero)
-                * weight[0]
-                * (one + self.lost[3] * (one - weight[0]));
+            let after_lost =
+                left * rough.most(zero) * weight[0] * (one + self.lost[3] * (one - weight[0]));
             for k in 0..3 {
                 mean[k] = mean[k] * (one - keep) + after[k] * keep;
             }

@@ -153,8 +153,7 @@ pub fn craters<T: Real>(p: Place<T>, share: T, seed: u32) -> [T; 3] {
         let upper = words.map(|w| T::of(f64::from(w >> 16)) * sixteenth);
         let radius = T::of(0.15) + T::of(0.25) * upper[1] * upper[1];
         let away: [T; 2] = std::array::from_fn(|a| {
-            let jitter =
-                T::of(f64::from(words[a] & 0xffff)) * T::of(2f64.powi(-17)) + T::of(0.25);
+            let jitter = T::of(f64::from(words[a] & 0xffff)) * T::of(2f64.powi(-17)) + T::of(0.25);
             (p.frac[a] - T::of(f64::from(step[a])) - jitter) / radius
         });
         let square = away[0] * away[0] + away[1] * away[1];

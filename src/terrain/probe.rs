@@ -98,7 +98,11 @@ pub fn heights(
             rows.extend(footprint.to_le_bytes());
             rows.extend([0; 4]);
         }
-        let input = buffer("veduta places", rows.len(), Usage::STORAGE | Usage::COPY_DST);
+        let input = buffer(
+            "veduta places",
+            rows.len(),
+            Usage::STORAGE | Usage::COPY_DST,
+        );
         queue.write_buffer(&input, 0, &rows);
         let size = part.len() * RESULT;
         let output = buffer("veduta heights", size, Usage::STORAGE | Usage::COPY_SRC);

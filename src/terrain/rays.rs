@@ -171,7 +171,11 @@ pub fn ray_hits(
         let input = buffer("veduta rays", rows.len(), Usage::STORAGE | Usage::COPY_DST);
         queue.write_buffer(&input, 0, &rows);
         let output = buffer("veduta hits", 48 * count, Usage::STORAGE | Usage::COPY_SRC);
-        let staging = buffer("veduta read back", 48 * count, Usage::COPY_DST | Usage::MAP_READ);
+        let staging = buffer(
+            "veduta read back",
+            48 * count,
+            Usage::COPY_DST | Usage::MAP_READ,
+        );
         let layouts = &ready.bind_group_layouts;
         let groups = if let Some(clipmap) = &mut clipmap {
             let _ = clipmap.prepare(queue, &mut encoder, eye, 0.0);

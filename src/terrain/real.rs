@@ -61,8 +61,9 @@ impl Real for f32 {
     fn vector(word: u32) -> [f32; 2] {
         let u = f32::from_bits((word >> 9) | 0x3f80_0000) - 1.0;
         let q = u * u;
-        let short = u
-            + u * (q * (q * (q * -5.0847045569e-5 + 0.00352140138907) - 0.114191288864) + 0.110720731116);
+        let short = u + u
+            * (q * (q * (q * -5.0847045569e-5 + 0.00352140138907) - 0.114191288864)
+                + 0.110720731116);
         let long = (2.0 - short * short).sqrt();
         let [x, y] = if word & 4 != 0 {
             [short, long]

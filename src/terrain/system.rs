@@ -9,7 +9,7 @@ use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
 use crate::program::{Pipeline, PipelineOptions, ProgramSet};
 use crate::programs::blocks::{Field as FieldBlock, Rock as RockBlock, TerrainView as ViewBlock};
 use crate::settings::{Preset, Settings};
-use crate::view::{View, WorldPos};
+use crate::view::View;
 
 /// Irradiances on the ground, in the picture's own unit. A host that has an atmosphere takes them from its `SkyQuery`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,7 +100,7 @@ impl Terrain {
     /// Builds pipelines and makes room for heights.
     ///
     /// # Errors
-    /// [`Error::OutOfDomain`] for targets that it cannot draw into and for options; the faults of [`Settings::resolve`] and [`Clipmap::new`].
+    /// [`Error::OutOfDomain`] for targets that it cannot draw into or that have no depth, and for options; the faults of [`Settings::resolve`] and [`Clipmap::new`].
     pub fn new(
         device: &wgpu::Device,
         programs: &ProgramSet,
@@ -115,6 +115,13 @@ impl Terrain {
                 domain: "Perspective: footprints grow with the distance".to_owned(),
             });
         }
+        let Some(depth_format) = targets.depth_format else {
+            return Err(Error::OutOfDomain {
+                name: "targets.depth_format".to_owned(),
+                value: "None".to_owned(),
+                domain: "the format of a depth buffer, which the terrain writes".to_owned(),
+            });
+        };
         let output = output_of(targets.color_format)?;
         let settings = Settings::resolve(programs, &options.preset, None, &[])?;
         let low = settings.number("TEXTURE_LOW_QUALITY").unwrap_or(0.0) != 0.0;
@@ -145,8 +152,8 @@ impl Terrain {
             device,
             &PipelineOptions {
                 targets: &[Some(targets.color_format.into())],
-                depth_stencil: targets.depth_format.map(|format| wgpu::DepthStencilState {
-                    format,
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: depth_format,
                     depth_write_enabled: Some(true),
                     depth_compare: Some(match targets.depth {
                         Depth::Normal => wgpu::CompareFunction::Less,
@@ -275,13 +282,9 @@ impl Terrain {
         }
         let pixel_angle = 2.0 * up.length() / rows as f32;
         let eye = view.eye.normalized();
-        let foot = WorldPos {
-            cell: eye.cell,
-            frac: eye.frac,
-        };
         let field = *self.clipmap.field();
         // Nothing seen is much nearer than the ground below; a level finer than a pixel there would not be used. NaN for a program's own function.
-        let clearance = eye.altitude() - f64::from(field.ground(foot, 0.0).height);
+        let clearance = eye.altitude() - f64::from(field.ground(eye, 0.0).height);
         let nearest = if clearance.is_nan() { 0.0 } else { clearance };
         let least = 0.35 * f64::from(pixel_angle) * nearest.max(0.0);
         let mut work = self.clipmap.prepare(queue, encoder, eye, least);
@@ -326,7 +329,10 @@ impl Terrain {
         };
         let blocks = [
             (&self.view, block.to_bytes().to_vec()),
-            (&self.field, field.block(field.place(eye)).to_bytes().to_vec()),
+            (
+                &self.field,
+                field.block(field.place(eye)).to_bytes().to_vec(),
+            ),
             (&self.rock, rock.to_bytes().to_vec()),
         ];
         for ((buffer, bytes), held) in blocks.into_iter().zip(&mut self.held) {

@@ -7,9 +7,20 @@ use veduta::view::direction;
 use crate::common::gpu;
 
 /// Rays of a picture of so many rows, 16:9 and 60 degrees high, from above a place.
-fn rays(land: &Land, rows: usize, height: f64, pitch: f64, place: [f64; 2]) -> (Vec<TerrainRay>, f32) {
+fn rays(
+    land: &Land,
+    rows: usize,
+    height: f64,
+    pitch: f64,
+    place: [f64; 2],
+) -> (Vec<TerrainRay>, f32) {
     let foot = WorldPos::from_metres([place[0], 0.0, place[1]].into());
-    let ground = land.field.prepare::<f64>().unwrap().ground(foot, 0.0).height;
+    let ground = land
+        .field
+        .prepare::<f64>()
+        .unwrap()
+        .ground(foot, 0.0)
+        .height;
     let origin = foot.moved_by([0.0, ground + height, 0.0].into());
     let mut view = veduta::View::default();
     view.look(0.3, f64::to_radians(pitch), 60_f32.to_radians(), 16.0 / 9.0);
@@ -43,12 +54,24 @@ fn rays_over_baked_heights_meet_the_field() {
     ] {
         let land = Land::named(name).unwrap();
         let (rays, angle) = rays(&land, rows, height, pitch, [13_500.0, -14_700.0]);
-        let found = ray_hits(gpu(), veduta::programs(), &land, &rays, angle, RayPath::Fast).unwrap();
+        let found = ray_hits(
+            gpu(),
+            veduta::programs(),
+            &land,
+            &rays,
+            angle,
+            RayPath::Fast,
+        )
+        .unwrap();
         let field = land.field.prepare::<f64>().unwrap();
         let top = land.field.bounds().unwrap().maximum;
         let truth: Vec<_> = rays
             .iter()
-            .map(|r| field.ray_hit(land.planet_radius, top, r, f64::from(angle), 0.05).unwrap())
+            .map(|r| {
+                field
+                    .ray_hit(land.planet_radius, top, r, f64::from(angle), 0.05)
+                    .unwrap()
+            })
             .collect();
         // A pixel is next to the silhouette when one of its neighbours sees the other side of it.
         let met = |i: usize| truth[i].distance.is_finite();
@@ -71,10 +94,25 @@ fn rays_over_baked_heights_meet_the_field() {
             capped += i32::from(f.capped);
             match (f.distance.is_finite(), t.distance.is_finite()) {
                 (true, true) => {
-                    // Across the ray: the distance along it times how steeply it meets the ground.
-                    let cosine = (0..3).map(|k| rays[i].dir[k] * t.normal[k]).sum::<f64>().abs();
-                    let across = (f.distance - t.distance).abs() * cosine;
-                    errors.push(across / (f64::from(angle) * t.distance).max(0.05));
+                    // Across the ray: how far it stays above the field where it should not have ended, or how deep it dips where it should have.
+                    let (near, far) = (f.distance.min(t.distance), f.distance.max(t.distance));
+                    let eye = field.place(rays[i].origin);
+                    let radius = land.planet_radius + rays[i].origin.altitude();
+                    let gap = |at: f64| {
+                        let [x, y, z] = rays[i].dir.map(|c| c * at);
+                        let altitude =
+                            (x * x + (y + radius).powi(2) + z * z).sqrt() - land.planet_radius;
+                        let g = field.ground_from(eye, [x, z], f64::from(angle) * at);
+                        (altitude - g.height) * g.normal()[1]
+                    };
+                    let across = if f.distance < t.distance {
+                        gap(near)
+                    } else {
+                        (0..=64)
+                            .map(|k| -gap(near + (far - near) * f64::from(k) / 64.0))
+                            .fold(0.0, f64::max)
+                    };
+                    errors.push(across.abs() / (f64::from(angle) * t.distance).max(0.05));
                 }
                 (false, false) => {}
                 _ if near_edge(i) => at_edge += 1,
@@ -114,6 +152,7 @@ fn the_sun_shines_where_the_ground_lets_it() {
     let gpu = gpu();
     let targets = veduta::Targets {
         color_format: wgpu::TextureFormat::Rgba32Float,
+        depth_format: Some(wgpu::TextureFormat::Depth32Float),
         ..Default::default()
     };
     let options = TerrainOptions {
@@ -148,15 +187,68 @@ fn the_sun_shines_where_the_ground_lets_it() {
         .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
         .unwrap();
     assert_eq!(again, Default::default(), "nothing is done twice");
-    let picture = crate::common::draw_with(
-        [columns as u32, rows as u32],
+    let size = wgpu::Extent3d {
+        width: columns as u32,
+        height: rows as u32,
+        depth_or_array_layers: 1,
+    };
+    let [color, depth] = [
         wgpu::TextureFormat::Rgba32Float,
-        |pass| {
-            let _ = terrain.draw_opaque(pass);
-        },
+        wgpu::TextureFormat::Depth32Float,
+    ]
+    .map(|format| {
+        gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size,
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        })
+    });
+    let [color_view, depth_view] = [&color, &depth].map(|t| t.create_view(&Default::default()));
+    {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &color_view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: Default::default(),
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &depth_view,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        let _ = terrain.draw_opaque(&mut pass);
+    }
+    gpu.queue.submit([encoder.finish()]);
+    let floats = |texture: &wgpu::Texture| -> Vec<f32> {
+        gpu.read_texture(texture)
+            .unwrap()
+            .chunks_exact(4)
+            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            .collect()
+    };
+    let (picture, depths) = (floats(&color), floats(&depth));
+    assert!(picture.iter().all(|v| v.is_finite()));
+    let near = |row: usize| depths[row * columns + columns / 2];
+    assert!(
+        near(0) == 0.0 || near(0) < near(rows - 1),
+        "the ground below is nearer"
     );
-    assert_eq!(picture.not_finite(), 0);
-    let (mut wrong, mut judged, mut lit, mut dark) = (0, 0, 0, 0);
+    let forward = view
+        .world_from_view
+        .transform_vector3(Vec3::NEG_Z)
+        .as_dvec3();
+    let (mut wrong, mut judged, mut lit, mut dark, mut deep) = (0, 0, 0, 0, 0);
     for (i, ray) in rays.iter().enumerate() {
         let hit = field
             .ray_hit(land.planet_radius, top, ray, f64::from(angle), 0.05)
@@ -195,10 +287,17 @@ fn the_sun_shines_where_the_ground_lets_it() {
         judged += 1;
         lit += i32::from(up);
         dark += i32::from(!up);
-        let bright = picture.pixels[i][0] > 0.02;
+        // Reversed infinite depth is the near plane over the distance ahead.
+        let ahead = hit.distance * forward.dot(ray.dir.into());
+        let off = (0.1 / f64::from(depths[i]) / ahead - 1.0).abs();
+        deep += i32::from(off > 0.02);
+        let bright = picture[4 * i] > 0.02;
         wrong += i32::from(bright != up);
     }
-    println!("{wrong} of {judged} wrong, {lit} lit and {dark} dark");
+    println!(
+        "{wrong} of {judged} wrong, {lit} lit and {dark} dark; {deep} depths off by more than 2 %"
+    );
+    assert!(f64::from(deep) <= 0.03 * f64::from(judged));
     assert!(lit > 100 && dark > 20);
     assert!(f64::from(wrong) <= 0.02 * f64::from(judged));
 }

@@ -155,7 +155,11 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
         Some(Sky::new(device, veduta::programs(), &over, &options)?)
     };
     let mut lights = TerrainLights {
-        sun: if to_sun.y > 0.0 { Vec3::ONE } else { Vec3::ZERO },
+        sun: if to_sun.y > 0.0 {
+            Vec3::ONE
+        } else {
+            Vec3::ZERO
+        },
         sky: Vec3::ZERO,
         bounce: Vec3::ZERO,
     };

@@ -87,7 +87,12 @@ pub struct HeightArgs {
     #[arg(long, value_enum, default_value = "cpu")]
     pub on: On,
     /// Width of what one height stands for, in metres; 0: the field as it is
-    #[arg(long, value_name = "M", default_value = "0", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "M",
+        default_value = "0",
+        allow_hyphen_values = true
+    )]
     pub footprint: f32,
     /// Where the heights go, .npy or .csv
     #[arg(long, value_name = "H")]
@@ -230,7 +235,14 @@ fn terrain(args: &TerrainArgs) -> Result<(), CliError> {
                 RayPath::Textbook
             };
             let gpu = veduta::device::shared()?;
-            ray_hits(gpu, veduta::programs(), &land, &rays, args.pixel_angle, path)?
+            ray_hits(
+                gpu,
+                veduta::programs(),
+                &land,
+                &rays,
+                args.pixel_angle,
+                path,
+            )?
         }
     };
     let capped = hits.iter().filter(|h| h.capped).count();
@@ -272,10 +284,16 @@ fn height(args: &HeightArgs) -> Result<(), CliError> {
     let heights: Vec<u32> = match args.on {
         On::Device => {
             let gpu = veduta::device::shared()?;
-            veduta::terrain::heights(gpu, veduta::programs(), &land.field, &places, args.footprint)?
-                .iter()
-                .map(|g| g.height.to_bits())
-                .collect()
+            veduta::terrain::heights(
+                gpu,
+                veduta::programs(),
+                &land.field,
+                &places,
+                args.footprint,
+            )?
+            .iter()
+            .map(|g| g.height.to_bits())
+            .collect()
         }
         On::Cpu => {
             let field = land.field.prepare::<f32>()?;

@@ -472,7 +472,16 @@ impl Answer for Ground {
 impl Answer for field::Refined {
     fn values(self) -> Values {
         let ([x, y, z], [a, b]) = (self.normal, self.ground.slope);
-        Values::new(&[self.distance, x, y, z, self.ground.height, a, b, self.ground.lost])
+        Values::new(&[
+            self.distance,
+            x,
+            y,
+            z,
+            self.ground.height,
+            a,
+            b,
+            self.ground.lost,
+        ])
     }
 }
 
