@@ -63,16 +63,16 @@ fn uncovered(old: Option<Window>, new: Window, size: i64) -> Vec<Span> {
     let mut spans = Vec::new();
     // All columns that are new, then the new rows of the others.
     let mut rest = whole;
-    for k in 0..2 {
-        if moved[k] == 0 {
+    for (k, by) in moved.into_iter().enumerate() {
+        if by == 0 {
             continue;
         }
         let mut part = rest;
-        if moved[k] > 0 {
-            part.from[k] = rest.to[k] - moved[k];
+        if by > 0 {
+            part.from[k] = rest.to[k] - by;
             rest.to[k] = part.from[k];
         } else {
-            part.to[k] = rest.from[k] - moved[k];
+            part.to[k] = rest.from[k] - by;
             rest.from[k] = part.to[k];
         }
         spans.push(part);

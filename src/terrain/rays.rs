@@ -65,7 +65,7 @@ impl TerrainRay {
             value,
             domain: domain.to_owned(),
         };
-        if !((length - 1.0).abs() < 1e-3) {
+        if length.is_nan() || (length - 1.0).abs() > 1e-3 {
             let value = format!("{:?}", self.dir);
             return Err(fault("the direction", value, "a unit vector"));
         }

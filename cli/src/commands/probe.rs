@@ -200,13 +200,14 @@ fn terrain(args: &TerrainArgs) -> Result<(), CliError> {
     let numbers = Table::read(&args.rays, 7)?.to_numbers(&args.rays)?;
     let mut rays = Vec::with_capacity(numbers.len() / 7);
     for (row, [x, y, z, dx, dy, dz, far]) in numbers.as_chunks::<7>().0.iter().enumerate() {
-        if !(x.abs() <= 9e15 && z.abs() <= 9e15 && y.abs() <= 1e5) {
+        let near = x.abs() <= 9e15 && z.abs() <= 9e15 && y.abs() <= 1e5;
+        if !near {
             return Err(fault(format!(
                 "the origin of row {row} is ({x}, {y}, {z}), but must be within 9e15 m, and its altitude within 1e5 m"
             )));
         }
         let length = (dx * dx + dy * dy + dz * dz).sqrt();
-        if !((length - 1.0).abs() <= 1e-3) {
+        if length.is_nan() || (length - 1.0).abs() > 1e-3 {
             return Err(fault(format!(
                 "the length of the direction of row {row} is {length}, but must be 1 to 1e-3"
             )));
@@ -273,7 +274,8 @@ fn height(args: &HeightArgs) -> Result<(), CliError> {
     let numbers = Table::read(&args.points, 2)?.to_numbers(&args.points)?;
     let mut places = Vec::with_capacity(numbers.len() / 2);
     for (row, [x, z]) in numbers.as_chunks::<2>().0.iter().enumerate() {
-        if !(x.abs() <= 9e15 && z.abs() <= 9e15) {
+        let near = x.abs() <= 9e15 && z.abs() <= 9e15;
+        if !near {
             return Err(CliError::Table {
                 path: args.points.clone(),
                 what: format!("row {row} is ({x}, {z}), but must be within 9e15 m"),
