@@ -69,6 +69,14 @@ pub enum Error {
         /// The names that exist.
         known: Vec<String>,
     },
+    /// No land has this name.
+    #[error("no land is called `{name}`; there are {}", list(.known))]
+    UnknownLand {
+        /// The name asked for.
+        name: String,
+        /// The names that exist.
+        known: Vec<String>,
+    },
     /// A text is not the RON that it should be, or cannot be written as RON.
     #[error("{0}")]
     Ron(String),

@@ -17,6 +17,7 @@ pub mod program;
 #[cfg(feature = "reference")]
 pub mod reference;
 pub mod settings;
+pub mod terrain;
 pub mod view;
 
 /// The programs that this crate's build composed, with the layouts of their parameter blocks.

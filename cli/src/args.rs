@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands;
 
-/// Outdoor landscapes for wgpu: render, sky, compose, lint, list, bench, cost, stress, diff, eval, probe.
+/// Outdoor landscapes for wgpu: render, sky, land, compose, lint, list, bench, cost, stress, diff, eval, probe.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "veduta", version, about, arg_required_else_help = true)]
 pub struct Args {
@@ -23,6 +23,8 @@ pub enum Command {
     Compose(commands::compose::ComposeArgs),
     /// Draw an atmosphere from any altitude
     Sky(commands::sky::SkyArgs),
+    /// Draw a land under its sky
+    Land(commands::land::LandArgs),
     /// Check modules, programs, presets, scenes and views; for continuous integration
     Lint(commands::lint::LintArgs),
     /// Show what there is: programs, presets, scenes, views, keys, adapters
@@ -37,7 +39,7 @@ pub enum Command {
     Diff(commands::diff::DiffArgs),
     /// Evaluate a WGSL expression over rows of numbers on the device
     Eval(commands::eval::EvalArgs),
-    /// Find the light along given rays
+    /// Find the light along given rays, heights of given places, or where rays meet a land
     Probe(commands::probe::ProbeArgs),
 }
 
@@ -50,6 +52,7 @@ impl Args {
         match &self.command {
             Command::Render(args) => commands::render::run(args),
             Command::Sky(args) => commands::sky::run(args),
+            Command::Land(args) => commands::land::run(args),
             Command::Compose(args) => commands::compose::run(args),
             Command::Lint(args) => commands::lint::run(args),
             Command::List(args) => commands::list::run(args),

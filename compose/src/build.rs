@@ -48,6 +48,11 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         ],
         "air_columns" | "air_diffuse" | "air_transmittance" | "sky_view" | "sky_aerial"
         | "sky_probe" | "sky_query" | "probe" => &[&[]],
+        "terrain" | "terrain_heights" => return vec![BTreeSet::new()],
+        "terrain_bake" => return vec![BTreeSet::new(), BTreeSet::from(["CLIP_MAXIMA".to_owned()])],
+        "terrain_rays" => {
+            return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
+        }
         _ => &[],
     };
     let set = |flags: &[&str]| flags.iter().map(|f| (*f).to_owned()).collect();

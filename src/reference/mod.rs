@@ -8,6 +8,7 @@ pub mod air_ray;
 pub mod air_tables;
 pub mod atmosphere;
 pub mod clouds;
+pub mod field;
 pub mod fractal;
 pub mod hash;
 pub mod intersect;

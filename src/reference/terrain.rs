@@ -339,6 +339,27 @@ pub fn shade_three_lights(
     })
 }
 
+/// Light received by a surface of which only the mean slopes and the mean square about them are known.
+pub fn shade_rough(
+    lights: &ThreeLights,
+    slope: [f64; 2],
+    lost: f64,
+    to_sun: [f64; 3],
+    shadow: f64,
+) -> [f64; 3] {
+    let size = (1.0 + slope[0] * slope[0] + slope[1] * slope[1] + lost).sqrt();
+    let normal = [-slope[0] / size, 1.0 / size, -slope[1] / size];
+    let spread = 0.8 * (0.5 * lost).sqrt() / size;
+    let lit = |x: f64, width: f64| 0.5 * (x + x.hypot(width));
+    let direct = lit(dot(normal, to_sun), spread * to_sun[0].hypot(to_sun[2])) * shadow;
+    let bounce = lit(dot(normal, bounce_direction(to_sun)), spread);
+    std::array::from_fn(|k| {
+        direct * lights.sun_color[k]
+            + normal[1] * lights.sky_color[k]
+            + bounce * lights.bounce_color[k]
+    })
+}
+
 /// Scale, colours and place of the rock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rock {
@@ -397,6 +418,51 @@ pub fn rock_high(rock: &Rock, position: [f64; 3]) -> [f64; 3] {
     );
     let grain = rock_noise(rock, position, [8; 3], 2);
     let stains = rock_noise(rock, position, [2; 3], 3);
+    let tone = (0.5 + 0.3 * bulk + 0.3 * strata + 0.25 * grain).clamp(0.0, 1.0);
+    mix(
+        mix(rock.dark, rock.light, tone),
+        rock.stain,
+        0.6 * smoothstep(0.05, 0.6, stains),
+    )
+}
+
+/// One fBm of the rock, each octave by the share of it that a footprint leaves.
+pub fn faded_noise(
+    rock: &Rock,
+    position: [f64; 3],
+    fineness: [i32; 3],
+    seed: u32,
+    footprint: f64,
+) -> f64 {
+    let finest = f64::from(fineness.into_iter().max().unwrap_or(1));
+    let part = |octaves: i32| {
+        let rock = Rock { octaves, ..*rock };
+        rock_noise(&rock, position, fineness, seed)
+    };
+    (0..rock.octaves)
+        .map(|i| {
+            let cells = rock.wavelength / (finest * 2_f64.powi(i));
+            super::field::kept(cells, footprint) * (part(i + 1) - part(i))
+        })
+        .sum()
+}
+
+/// Albedo of the rock from one fBm, faded by a footprint.
+pub fn rock_low_faded(rock: &Rock, position: [f64; 3], footprint: f64) -> [f64; 3] {
+    let tone = faded_noise(rock, position, [1; 3], 0, footprint);
+    mix(rock.dark, rock.light, (0.5 + 0.6 * tone).clamp(0.0, 1.0))
+}
+
+/// Albedo of the rock from four fBm, faded by a footprint.
+pub fn rock_high_faded(rock: &Rock, position: [f64; 3], footprint: f64) -> [f64; 3] {
+    let noise = |p, fineness, seed| faded_noise(rock, p, fineness, seed, footprint);
+    let bulk = noise(position, [1; 3], 0);
+    let bent = add(position, [0.0, 0.5 * bulk * rock.wavelength, 0.0]);
+    let (strata, grain, stains) = (
+        noise(bent, [1, 5, 1], 1),
+        noise(position, [8; 3], 2),
+        noise(position, [2; 3], 3),
+    );
     let tone = (0.5 + 0.3 * bulk + 0.3 * strata + 0.25 * grain).clamp(0.0, 1.0);
     mix(
         mix(rock.dark, rock.light, tone),

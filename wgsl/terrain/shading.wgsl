@@ -41,3 +41,32 @@ fn shade_three_lights(lights: ThreeLights, normal: vec3<f32>, to_sun: vec3<f32>,
     let bounce = max(dot(normal, bounce_direction(to_sun)), 0.0);
     return direct * lights.sun_color + ambient * lights.sky_color + bounce * lights.bounce_color;
 }
+
+/// Light received by a surface of which only mean slopes are known: `lost` is the mean square of the slopes about them. The mean of the normals is shorter
+/// than 1, and where the sun grazes the surface part of it is lit.
+///
+/// With normals spread by s about the mean, the mean of max(n . l, 0) is taken for (x + sqrt(x^2 + (0.8 s)^2)) / 2, exact far from and at x = 0.
+///
+/// domain  slope in [-10, 10] 1 lin
+/// domain  lost in [0, 10] 1 lin
+/// domain  to_sun in [-1, 1] 1 lin
+/// domain  shadow in [0, 1] 1 lin
+/// domain  lights.sun_color in [0, 10] 1 lin
+/// domain  lights.sky_color in [0, 10] 1 lin
+/// domain  lights.bounce_color in [0, 10] 1 lin
+/// range   [0, 40] 1
+/// error   1e-5 abs of reference::terrain::shade_rough
+/// outside undefined
+/// source  Leitner2022 eq. 4.1; mean over slopes: ours
+fn shade_rough(lights: ThreeLights, slope: vec2<f32>, lost: f32, to_sun: vec3<f32>, shadow: f32) -> vec3<f32> {
+    let shrink = inverseSqrt(1.0 + dot(slope, slope) + lost);
+    let normal = vec3<f32>(-slope.x, 1.0, -slope.y) * shrink;
+    // The slopes' spread towards the sun, and towards a level light.
+    let spread = 0.8 * shrink * sqrt(0.5 * lost);
+    let x = dot(normal, to_sun);
+    let width = spread * length(to_sun.xz);
+    let direct = 0.5 * (x + sqrt(x * x + width * width));
+    let y = dot(normal, bounce_direction(to_sun));
+    let bounce = 0.5 * (y + sqrt(y * y + spread * spread));
+    return max(direct, 0.0) * shadow * lights.sun_color + normal.y * lights.sky_color + max(bounce, 0.0) * lights.bounce_color;
+}

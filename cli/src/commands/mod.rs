@@ -5,6 +5,7 @@ pub mod compose;
 pub mod cost;
 pub mod diff;
 pub mod eval;
+pub mod land;
 pub mod lint;
 pub mod list;
 pub mod probe;

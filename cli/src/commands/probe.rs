@@ -1,4 +1,4 @@
-//! `veduta probe`: the light along given rays.
+//! `veduta probe`: the light along given rays, and heights of given places.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,8 @@ use veduta::Atmosphere;
 use veduta::atmosphere::{Orders, ProbeOptions, ProbePath, ProbeRay, SkyQuality, probe};
 use veduta::eval::ResultKind;
 use veduta::reference;
-use veduta::{Preset, Settings};
+use veduta::terrain::{Land, RayPath, TerrainRay, ray_hits};
+use veduta::{Preset, Settings, WorldPos};
 
 use crate::error::CliError;
 use crate::image::check_folder;
@@ -25,6 +26,77 @@ pub struct ProbeArgs {
 pub enum What {
     /// Radiance and transmittance of the sky along rays
     Sky(SkyArgs),
+    /// Heights of a land at given places
+    Height(HeightArgs),
+    /// Where rays meet a land
+    Terrain(TerrainArgs),
+}
+
+/// How rays are followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Follow {
+    /// In double precision on the processor, by bracketing
+    Reference,
+    /// On the device, by steps in proportion to the clearance
+    Textbook,
+    /// On the device, over baked heights
+    Fast,
+}
+
+/// Arguments of `veduta probe terrain`.
+#[derive(Debug, Clone, clap::Args)]
+pub struct TerrainArgs {
+    /// A shipped land or a .ron file
+    #[arg(long, value_name = "NAME|FILE", default_value = "thesis")]
+    pub scene: String,
+    /// The rays, .npy or .csv: origin, unit direction, largest distance
+    #[arg(long, value_name = "ROWS")]
+    pub rays: PathBuf,
+    /// How rays are followed
+    #[arg(long, value_enum, default_value = "fast")]
+    pub path: Follow,
+    /// Angle of a pixel in radians, in [1e-5, 0.1]: the footprint is the distance times this
+    #[arg(long, value_name = "RAD", default_value = "0.004")]
+    pub pixel_angle: f32,
+    /// Where the hits go, .npy or .csv: distance, normal, height
+    #[arg(long, value_name = "HITS")]
+    pub out: PathBuf,
+}
+
+/// Where the heights are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum On {
+    /// On the processor, in the device's single precision
+    Cpu,
+    /// On the device
+    Device,
+    /// On the processor in double precision
+    Reference,
+}
+
+/// Arguments of `veduta probe height`.
+#[derive(Debug, Clone, clap::Args)]
+pub struct HeightArgs {
+    /// A shipped land or a .ron file
+    #[arg(long, value_name = "NAME|FILE", default_value = "thesis")]
+    pub scene: String,
+    /// The places, .npy or .csv: x and z in metres
+    #[arg(long, value_name = "XZ")]
+    pub points: PathBuf,
+    /// Where the heights are computed
+    #[arg(long, value_enum, default_value = "cpu")]
+    pub on: On,
+    /// Width of what one height stands for, in metres; 0: the field as it is
+    #[arg(
+        long,
+        value_name = "M",
+        default_value = "0",
+        allow_hyphen_values = true
+    )]
+    pub footprint: f32,
+    /// Where the heights go, .npy or .csv
+    #[arg(long, value_name = "H")]
+    pub out: PathBuf,
 }
 
 /// How the light is found.
@@ -89,7 +161,159 @@ pub struct SkyArgs {
 pub fn run(args: &ProbeArgs) -> Result<(), CliError> {
     match &args.what {
         What::Sky(args) => sky(args),
+        What::Height(args) => height(args),
+        What::Terrain(args) => terrain(args),
     }
+}
+
+/// A shipped land by its name, or that of a `.ron` file.
+///
+/// # Errors
+/// [`CliError::Read`], [`CliError::Table`] with the file and what is wrong in it, a name that does not exist.
+pub fn land(name: &str) -> Result<Land, CliError> {
+    let path = Path::new(name);
+    if path.extension().is_none_or(|e| e != "ron") {
+        return Ok(Land::named(name)?);
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| CliError::read(path, e))?;
+    Land::from_ron(&text).map_err(|e| CliError::Table {
+        path: path.to_owned(),
+        what: e.to_string(),
+    })
+}
+
+fn terrain(args: &TerrainArgs) -> Result<(), CliError> {
+    Format::of(&args.out)?;
+    check_folder(&args.out)?;
+    let land = land(&args.scene)?;
+    if !(1e-5..=0.1).contains(&args.pixel_angle) {
+        return Err(CliError::argument(
+            "--pixel-angle",
+            args.pixel_angle.to_string(),
+            "in [1e-5, 0.1] rad",
+        ));
+    }
+    let fault = |what: String| CliError::Table {
+        path: args.rays.clone(),
+        what,
+    };
+    let numbers = Table::read(&args.rays, 7)?.to_numbers(&args.rays)?;
+    let mut rays = Vec::with_capacity(numbers.len() / 7);
+    for (row, [x, y, z, dx, dy, dz, far]) in numbers.as_chunks::<7>().0.iter().enumerate() {
+        let near = x.abs() <= 9e15 && z.abs() <= 9e15 && y.abs() <= 1e5;
+        if !near {
+            return Err(fault(format!(
+                "the origin of row {row} is ({x}, {y}, {z}), but must be within 9e15 m, and its altitude within 1e5 m"
+            )));
+        }
+        let length = (dx * dx + dy * dy + dz * dz).sqrt();
+        if length.is_nan() || (length - 1.0).abs() > 1e-3 {
+            return Err(fault(format!(
+                "the length of the direction of row {row} is {length}, but must be 1 to 1e-3"
+            )));
+        }
+        let ray = TerrainRay {
+            origin: WorldPos::from_metres([*x, *y, *z].into()),
+            dir: [dx / length, dy / length, dz / length],
+            far: *far,
+        };
+        ray.check(row).map_err(|e| fault(e.to_string()))?;
+        rays.push(ray);
+    }
+    let hits = match args.path {
+        Follow::Reference => {
+            let field = land.field.prepare::<f64>()?;
+            let top = land.field.bounds()?.maximum;
+            let angle = f64::from(args.pixel_angle);
+            rays.iter()
+                .map(|r| field.ray_hit(land.planet_radius, top, r, angle, 0.05))
+                .collect::<Result<Vec<_>, _>>()?
+        }
+        path => {
+            let path = if path == Follow::Fast {
+                RayPath::Fast
+            } else {
+                RayPath::Textbook
+            };
+            let gpu = veduta::device::shared()?;
+            ray_hits(
+                gpu,
+                veduta::programs(),
+                &land,
+                &rays,
+                args.pixel_angle,
+                path,
+            )?
+        }
+    };
+    let capped = hits.iter().filter(|h| h.capped).count();
+    if capped > 0 {
+        eprintln!("{capped} of {} rays ran out of steps", hits.len());
+    }
+    let found: Vec<u32> = hits
+        .iter()
+        .flat_map(|h| {
+            let [x, y, z] = h.normal;
+            [h.distance, x, y, z, h.height].map(|v| (v as f32).to_bits())
+        })
+        .collect();
+    write_results(&args.out, &found, 5, ResultKind::F32)
+}
+
+fn height(args: &HeightArgs) -> Result<(), CliError> {
+    Format::of(&args.out)?;
+    check_folder(&args.out)?;
+    let land = land(&args.scene)?;
+    if !(args.footprint >= 0.0 && args.footprint.is_finite()) {
+        return Err(CliError::argument(
+            "--footprint",
+            args.footprint.to_string(),
+            "finite and at least 0 m",
+        ));
+    }
+    let numbers = Table::read(&args.points, 2)?.to_numbers(&args.points)?;
+    let mut places = Vec::with_capacity(numbers.len() / 2);
+    for (row, [x, z]) in numbers.as_chunks::<2>().0.iter().enumerate() {
+        let near = x.abs() <= 9e15 && z.abs() <= 9e15;
+        if !near {
+            return Err(CliError::Table {
+                path: args.points.clone(),
+                what: format!("row {row} is ({x}, {z}), but must be within 9e15 m"),
+            });
+        }
+        places.push(WorldPos::from_metres([*x, 0.0, *z].into()));
+    }
+    let heights: Vec<u32> = match args.on {
+        On::Device => {
+            let gpu = veduta::device::shared()?;
+            veduta::terrain::heights(
+                gpu,
+                veduta::programs(),
+                &land.field,
+                &places,
+                args.footprint,
+            )?
+            .iter()
+            .map(|g| g.height.to_bits())
+            .collect()
+        }
+        On::Cpu => {
+            let field = land.field.prepare::<f32>()?;
+            places
+                .iter()
+                .map(|p| field.ground(*p, args.footprint).height.to_bits())
+                .collect()
+        }
+        On::Reference => {
+            let field = land.field.prepare::<f64>()?;
+            let footprint = f64::from(args.footprint);
+            places
+                .iter()
+                .map(|p| (field.ground(*p, footprint).height as f32).to_bits())
+                .collect()
+        }
+    };
+    write_results(&args.out, &heights, 1, ResultKind::F32)
 }
 
 /// A shipped atmosphere by its name, or that of a `.ron` file.

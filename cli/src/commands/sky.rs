@@ -81,7 +81,7 @@ fn sun_of_day(latitude: f64, declination: f64, hour: f64) -> [f64; 2] {
 }
 
 /// The exposure with which a bright part of the picture (the 80th centile of the brightest channel) is shown at a displayed 0.75.
-fn exposure_of(rgb: &[f32]) -> f64 {
+pub(crate) fn exposure_of(rgb: &[f32]) -> f64 {
     let mut brightest: Vec<f32> = rgb
         .chunks_exact(3)
         .map(|p| p[0].max(p[1]).max(p[2]))

@@ -6,6 +6,7 @@ use veduta::reference::air_tables::{
 };
 use veduta::reference::atmosphere::{Atmosphere, SkyLight};
 use veduta::reference::clouds::{CloudLayer, CloudLight};
+use veduta::reference::field::{self, Field, Ground};
 use veduta::reference::fractal::warp;
 use veduta::reference::noise::{Lattice2d, Lattice3d, simplex, worley};
 use veduta::reference::phase::DropletPhase;
@@ -51,6 +52,18 @@ impl Values {
 
 /// Functions that read textures, each with the test of `tests/all` that judges it on the device.
 pub const ELSEWHERE: &[(&str, &str)] = &[
+    (
+        "veduta::terrain::clipmap::baked_height",
+        "rays_over_baked_heights_meet_the_field",
+    ),
+    (
+        "veduta::terrain::clipmap::clip_hit",
+        "rays_over_baked_heights_meet_the_field",
+    ),
+    (
+        "veduta::terrain::clipmap::clip_shadow",
+        "the_sun_shines_where_the_ground_lets_it",
+    ),
     (
         "veduta::atmosphere::columns::sun_depth",
         "row_a07_the_table_of_columns_is_right_at_every_height_and_angle",
@@ -189,6 +202,20 @@ argument!(Terrain {
     gain: f64,
     smoothness: f64,
     seed: u32
+});
+argument!(Field {
+    cell: [i32; 2],
+    frac: [f64; 2],
+    wavelength: f64,
+    amplitude: f64,
+    base: f64,
+    fall: f64,
+    shape: f64,
+    detail: f64,
+    octaves: i32,
+    seed: u32,
+    mean: [f64; 4],
+    lost: [f64; 4]
 });
 argument!(Rock {
     cell: [i32; 3],
@@ -489,6 +516,29 @@ impl Answer for TerrainHit {
     }
 }
 
+impl Answer for Ground {
+    fn values(self) -> Values {
+        let [x, z] = self.slope;
+        Values::new(&[self.height, x, z, self.lost])
+    }
+}
+
+impl Answer for field::Refined {
+    fn values(self) -> Values {
+        let ([x, y, z], [a, b]) = (self.normal, self.ground.slope);
+        Values::new(&[
+            self.distance,
+            x,
+            y,
+            z,
+            self.ground.height,
+            a,
+            b,
+            self.ground.lost,
+        ])
+    }
+}
+
 impl Answer for (f64, i32) {
     fn values(self) -> Values {
         Values::new(&[self.0, f64::from(self.1)])
@@ -724,6 +774,21 @@ impl Entry {
             .lin("terrain.hurst", 1.0, 2.0)
             .lin("terrain.gain", 0.0, 2.0)
             .lin("terrain.smoothness", 0.0, 1.0)
+    }
+
+    /// The domains of a height field that the promises of errors are for.
+    fn field(self) -> Entry {
+        self.lin("field.cell", -2_147_483_648.0, 2_147_483_647.0)
+            .lin("field.frac", 0.0, 1.0)
+            .log("field.wavelength", 8192.0, 65536.0)
+            .lin("field.amplitude", 1.0, 1400.0)
+            .lin("field.base", -1000.0, 1000.0)
+            .lin("field.fall", 0.3, 0.5)
+            .lin("field.shape", 1.0, 2.0)
+            .lin("field.detail", 0.0, 1.0)
+            .lin("field.octaves", 1.0, 12.0)
+            .lin("field.mean", 0.1, 0.5)
+            .lin("field.lost", 0.1, 0.5)
     }
 
     fn rock(self) -> Entry {
@@ -1483,6 +1548,57 @@ pub fn registry() -> Vec<Entry> {
     );
     other!(
         list,
+        "terrain::field::ground_at",
+        "field::ground",
+        |field: Field, kind: i32, offset: [f64; 2], footprint: f64| {
+            field::ground(&field, kind, offset, footprint)
+        }
+    );
+    other!(
+        list,
+        "terrain::refine::refined_hit",
+        "field::refined",
+        |field: Field,
+         kind: i32,
+         radius: f64,
+         eye: f64,
+         origin: [f64; 3],
+         dir: [f64; 3],
+         t: f64,
+         pixel: f64,
+         most: f64,
+         steps: i32| {
+            field::refined(
+                &field, kind, radius, eye, origin, dir, t, pixel, most, steps,
+            )
+        }
+    );
+    other!(
+        list,
+        "terrain::material::faded_noise",
+        "terrain::faded_noise",
+        |rock: Rock, position: [f64; 3], fineness: [i32; 3], seed: u32, footprint: f64| {
+            terrain::faded_noise(&rock, position, fineness, seed, footprint)
+        }
+    );
+    other!(
+        list,
+        "terrain::material::rock_low_faded",
+        "terrain::rock_low_faded",
+        |rock: Rock, position: [f64; 3], footprint: f64| {
+            terrain::rock_low_faded(&rock, position, footprint)
+        }
+    );
+    other!(
+        list,
+        "terrain::material::rock_high_faded",
+        "terrain::rock_high_faded",
+        |rock: Rock, position: [f64; 3], footprint: f64| {
+            terrain::rock_high_faded(&rock, position, footprint)
+        }
+    );
+    other!(
+        list,
         "terrain::march::ray_clearance",
         "terrain::ray_clearance",
         |land: Terrain, radius: f64, eye: f64, dir: [f64; 3], t: f64, octaves: i32| {
@@ -1591,6 +1707,14 @@ pub fn registry() -> Vec<Entry> {
         "terrain::shade_three_lights",
         |lights: ThreeLights, normal: [f64; 3], to_sun: [f64; 3], shadow: f64| {
             terrain::shade_three_lights(&lights, normal, to_sun, shadow)
+        }
+    );
+    other!(
+        list,
+        "terrain::shading::shade_rough",
+        "terrain::shade_rough",
+        |lights: ThreeLights, slope: [f64; 2], lost: f64, to_sun: [f64; 3], shadow: f64| {
+            terrain::shade_rough(&lights, slope, lost, to_sun, shadow)
         }
     );
     other!(
@@ -1856,6 +1980,13 @@ fn particular(entry: Entry) -> Entry {
             .lin("front.in_scatter", 0.0, 10.0)
             .lin("front.transmittance", 0.0, 1.0),
         ("terrain::height", _) => entry.terrain().weight(20.0),
+        ("terrain::field", _) => entry.field().judged(&["height"]).weight(60.0),
+        ("terrain::refine", _) => entry
+            .field()
+            .unit("dir")
+            .lin("steps", 1.0, 1.0)
+            .judged(&["ground.height"])
+            .weight(60.0),
         ("terrain::march", "ray_clearance") => entry.terrain().unit("dir").weight(20.0),
         ("terrain::march", "march_constant") => entry
             .terrain()

@@ -1,0 +1,296 @@
+//! `veduta land`: a picture of a land under its sky.
+
+use std::path::PathBuf;
+
+use veduta::atmosphere::{LightPlace, Sky, SkyComposition, SkyOptions, SkyQuery};
+use veduta::glam::{DVec3, Vec3};
+use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
+use veduta::view::direction;
+use veduta::wgpu;
+use veduta::{Light, Preset, Targets, View, WorldPos};
+
+use super::probe::{atmosphere, land};
+use super::sky::exposure_of;
+use crate::cpu::CpuTime;
+use crate::error::CliError;
+use crate::image::{check_folder, check_output, write_exr, write_png};
+use crate::metrics::Picture;
+use crate::render::Size;
+
+/// Arguments of `veduta land`.
+#[derive(Debug, Clone, clap::Args)]
+pub struct LandArgs {
+    /// A shipped land or a .ron file
+    #[arg(long, value_name = "NAME|FILE", default_value = "thesis")]
+    pub land: String,
+    /// A shipped atmosphere or a .ron file; `none` for a land without air
+    #[arg(long, value_name = "NAME|FILE", default_value = "earth")]
+    pub atmosphere: String,
+    /// The preset
+    #[arg(long, value_name = "NAME", default_value = "high")]
+    pub preset: String,
+    /// Place of the eye, x and z in metres
+    #[arg(long, value_name = "X,Z", value_delimiter = ',', num_args = 2, default_values_t = [13500.0, -14700.0], allow_negative_numbers = true)]
+    pub place: Vec<f64>,
+    /// Height of the eye above the ground in metres, 0.1 to 1e7
+    #[arg(long, default_value_t = 300.0)]
+    pub eye_height: f64,
+    /// Direction of the view in degrees, clockwise from -z
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub yaw: f64,
+    /// Elevation of the view in degrees
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub pitch: f64,
+    /// Vertical field of view in degrees, 0.01 to 170
+    #[arg(long, default_value_t = 60.0)]
+    pub fov: f64,
+    /// Height of the sun above the horizon in degrees
+    #[arg(long, default_value_t = 30.0, allow_negative_numbers = true)]
+    pub sun_height: f64,
+    /// Azimuth of the sun in degrees, clockwise from -z
+    #[arg(long, default_value_t = 120.0, allow_negative_numbers = true)]
+    pub sun_azimuth: f64,
+    /// Distance at which rays end in metres, 100 to 4e6
+    #[arg(long, default_value_t = 100_000.0)]
+    pub far: f64,
+    /// Width and height of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "256x144")]
+    pub size: Size,
+    /// Factor on radiance before the tone map; found from the picture when left out
+    #[arg(long)]
+    pub exposure: Option<f64>,
+    /// Frames whose processor time is printed, of a flight at 100 m/s with 30 frames a second; the picture is the last
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    pub frames: u32,
+    /// The picture, .png or .exr (radiance for a sun of irradiance 1, not exposed)
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`CliError`] for arguments out of their domains and files that cannot be written; what the library reports.
+pub fn run(args: &LandArgs) -> Result<(), CliError> {
+    let exr = args
+        .out
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    check_output("--out", &args.out, if exr { "exr" } else { "png" })?;
+    check_folder(&args.out)?;
+    let within = |name: &str, value: f64, low: f64, high: f64| {
+        if (low..=high).contains(&value) {
+            return Ok(());
+        }
+        Err(CliError::argument(
+            name,
+            value.to_string(),
+            format!("in [{low}, {high}]"),
+        ))
+    };
+    within("--eye-height", args.eye_height, 0.1, 1e7)?;
+    within("--fov", args.fov, 0.01, 170.0)?;
+    within("--pitch", args.pitch, -90.0, 90.0)?;
+    within("--yaw", args.yaw, -360.0, 360.0)?;
+    within("--sun-height", args.sun_height, -90.0, 90.0)?;
+    within("--sun-azimuth", args.sun_azimuth, -360.0, 360.0)?;
+    within("--far", args.far, 100.0, 4e6)?;
+    for place in &args.place {
+        within("--place", *place, -9e15, 9e15)?;
+    }
+    if let Some(exposure) = args.exposure {
+        within("--exposure", exposure, 0.0, 1e12)?;
+    }
+    let gpu = veduta::device::shared()?;
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    let land = land(&args.land)?;
+    let airless = args.atmosphere == "none";
+    let mut air = atmosphere(if airless { "earth" } else { &args.atmosphere })?;
+    air.planet_radius = land.planet_radius;
+    let preset = Preset::Named(args.preset.clone().into());
+    let format = wgpu::TextureFormat::Rgba32Float;
+    let targets = Targets {
+        color_format: format,
+        depth_format: Some(wgpu::TextureFormat::Depth32Float),
+        ..Default::default()
+    };
+    let foot = WorldPos::from_metres(DVec3::new(args.place[0], 0.0, args.place[1]));
+    let ground = land.field.prepare::<f64>()?.ground(foot, 0.0).height;
+    let to_sun = direction(args.sun_height.to_radians(), args.sun_azimuth.to_radians());
+    let mut view = View {
+        eye: foot.moved_by(DVec3::new(0.0, ground + args.eye_height, 0.0)),
+        sun: Light {
+            to_light: to_sun.as_vec3(),
+            irradiance: Vec3::ONE,
+            angular_radius: air.sun.angular_radius as f32,
+        },
+        ..Default::default()
+    };
+    let (width, height) = (args.size.width, args.size.height);
+    view.look(
+        args.yaw.to_radians(),
+        args.pitch.to_radians(),
+        args.fov.to_radians() as f32,
+        width as f32 / height as f32,
+    );
+    let options = TerrainOptions {
+        preset: preset.clone(),
+        land,
+        far: args.far,
+        ..Default::default()
+    };
+    let mut terrain = Terrain::new(device, veduta::programs(), &targets, &options)?;
+    let mut sky = if airless {
+        None
+    } else {
+        let options = SkyOptions {
+            preset,
+            atmosphere: air,
+            composition: SkyComposition::OverPicture,
+        };
+        let over = Targets {
+            depth_format: None,
+            ..targets
+        };
+        Some(Sky::new(device, veduta::programs(), &over, &options)?)
+    };
+    let mut lights = TerrainLights {
+        sun: if to_sun.y > 0.0 {
+            Vec3::ONE
+        } else {
+            Vec3::ZERO
+        },
+        sky: Vec3::ZERO,
+        bounce: Vec3::ZERO,
+    };
+    if let Some(sky) = &mut sky {
+        let atmosphere = sky.tables().atmosphere().clone();
+        let query = SkyQuery::new(device, veduta::programs(), &atmosphere)?;
+        let place = LightPlace {
+            altitude: ground.clamp(0.0, atmosphere.thickness),
+            to_sun: to_sun.to_array(),
+            normal: [0.0, 1.0, 0.0],
+            sun_angular_radius: f64::from(view.sun.angular_radius),
+        };
+        let found = query.run(device, queue, sky.tables_mut(), &[place])?[0];
+        lights.sun = Vec3::from_array(found.sun);
+        lights.sky = Vec3::from_array(found.sky);
+        // What ground of an albedo of a fifth throws back onto a slope that faces it by half.
+        lights.bounce = 0.1 * (lights.sun * (to_sun.y.max(0.0) as f32) + lights.sky);
+    }
+    let texture = |format, usage| {
+        device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("picture"),
+            size: wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: usage
+                | wgpu::TextureUsages::RENDER_ATTACHMENT
+                | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        })
+    };
+    let picture = texture(format, wgpu::TextureUsages::COPY_SRC);
+    let shown = texture(format, wgpu::TextureUsages::COPY_SRC);
+    let depth = texture(
+        wgpu::TextureFormat::Depth32Float,
+        wgpu::TextureUsages::empty(),
+    );
+    let [picture_view, shown_view, depth_view] =
+        [&picture, &shown, &depth].map(|t| t.create_view(&Default::default()));
+    let finish = |encoder: wgpu::CommandEncoder| -> Result<(), CliError> {
+        queue.submit([encoder.finish()]);
+        device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|e| veduta::Error::Device(e.to_string()))?;
+        Ok(())
+    };
+    let now = CpuTime::now;
+    let since = |before: Option<CpuTime>| match (before, now()) {
+        (Some(before), Some(after)) => after.since(&before),
+        _ => f64::NAN,
+    };
+    let draw = |encoder: &mut wgpu::CommandEncoder, terrain: &Terrain| {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &picture_view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: Default::default(),
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &depth_view,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        let _ = terrain.draw_opaque(&mut pass);
+    };
+    // The first frame bakes everything and compiles; the flight then shows what a frame costs.
+    let (mut bakes, mut draws) = (Vec::new(), Vec::new());
+    for frame in 0..args.frames {
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let _ = terrain.prepare(queue, &mut encoder, &view, &lights, height)?;
+        let before = now();
+        finish(encoder)?;
+        bakes.push(since(before));
+        let mut encoder = device.create_command_encoder(&Default::default());
+        draw(&mut encoder, &terrain);
+        let before = now();
+        finish(encoder)?;
+        draws.push(since(before));
+        if frame + 1 < args.frames {
+            view.eye = view
+                .eye
+                .moved_by(direction(0.0, args.yaw.to_radians()) * (100.0 / 30.0));
+        }
+    }
+    if let Some((first, others)) = bakes.split_first() {
+        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
+        println!(
+            "processor ms a frame: {:.2} drawn, {:.2} baked; the first bake {first:.0}; {} bytes on the device",
+            mean(draws.get(1..).unwrap_or_default()),
+            mean(others),
+            terrain.resources().texture_bytes,
+        );
+    }
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let _ = terrain.prepare(queue, &mut encoder, &view, &lights, height)?;
+    draw(&mut encoder, &terrain);
+    if let Some(sky) = &mut sky {
+        sky.set_host(device, &depth_view, Some(&picture_view))?;
+        let _ = sky.prepare(queue, &mut encoder, &view)?;
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &shown_view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: Default::default(),
+            })],
+            ..Default::default()
+        });
+        let _ = sky.composite(&mut pass)?;
+    }
+    queue.submit([encoder.finish()]);
+    let bytes = gpu.read_texture(if airless { &picture } else { &shown })?;
+    let rgb: Vec<f32> = bytes
+        .chunks_exact(16)
+        .flat_map(|p| [0, 4, 8].map(|k| f32::from_le_bytes([p[k], p[k + 1], p[k + 2], p[k + 3]])))
+        .collect();
+    if exr {
+        return write_exr(&args.out, width, height, &rgb);
+    }
+    let exposure = args.exposure.unwrap_or_else(|| exposure_of(&rgb));
+    let shown = Picture::new(width as usize, height as usize, rgb)?.display(exposure);
+    write_png(&args.out, width, height, &shown)
+}

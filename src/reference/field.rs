@@ -1,0 +1,287 @@
+//! Height fields filtered by the footprint, from their definition: whole fractals of k octaves, and the mean of what follows.
+
+use super::fractal::{
+    fbm_2d_slope, hybrid_multifractal_2d_slope, octave_amplitude, octave_noise_2d,
+    ridged_multifractal_2d_slope,
+};
+use super::hash::lattice_hash_2d;
+use super::noise::{octave_2d, octave_frequency, octave_seed, split_2d};
+
+/// A height field and where the eye is on it: the members of `veduta::terrain::field::Field`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Field {
+    /// Lattice cell of the eye's foot point.
+    pub cell: [i32; 2],
+    /// Fraction within that cell.
+    pub frac: [f64; 2],
+    /// Wavelength of the lattice.
+    pub wavelength: f64,
+    /// Height of a value of 1.
+    pub amplitude: f64,
+    /// Height of a value of 0.
+    pub base: f64,
+    /// Fall of the amplitude from octave to octave.
+    pub fall: f64,
+    /// First parameter of the kind.
+    pub shape: f64,
+    /// Second parameter of the kind.
+    pub detail: f64,
+    /// Octaves.
+    pub octaves: i32,
+    /// Seed of the lattice.
+    pub seed: u32,
+    /// Series of the mean of what is left out: total, first, ratio, bend.
+    pub mean: [f64; 4],
+    /// Series of the squared slope of what is left out.
+    pub lost: [f64; 4],
+}
+
+/// The filtered field at a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ground {
+    /// Height.
+    pub height: f64,
+    /// Slope (dh/dx, dh/dz).
+    pub slope: [f64; 2],
+    /// Mean square of the slopes left out.
+    pub lost: f64,
+}
+
+/// The share of an octave that is left: 1 while its cells are two footprints wide, 0 at one.
+pub fn kept(wavelength: f64, footprint: f64) -> f64 {
+    let x = (wavelength / footprint.max(1e-6) - 1.0).clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}
+
+/// What is left of a series after so many of its terms; the hybrid's is a geometric sequence.
+fn remainder(kind: i32, [total, first, ratio, _]: [f64; 4], terms: i32) -> f64 {
+    if kind == 1 {
+        return total * ratio.powi(terms);
+    }
+    total - (0..terms).map(|i| first * ratio.powi(i)).sum::<f64>()
+}
+
+/// Profile of a crater and its slope.
+fn crater(x: f64) -> [f64; 2] {
+    let mut all = [0.0; 2];
+    if x < 1.0 {
+        all[0] -= 0.4 * (1.0 - x * x).powi(2);
+        all[1] += 1.6 * x * (1.0 - x * x);
+    }
+    let width = if x < 1.0 { 0.4 } else { 1.0 };
+    let y = (x - 1.0) / width;
+    if y.abs() < 1.0 {
+        all[0] += 0.08 * (1.0 - y * y).powi(2);
+        all[1] -= 0.32 * y * (1.0 - y * y) / width;
+    }
+    all
+}
+
+/// The craters of octave i: value and slope per cell of octave 0.
+fn crater_octave(field: &Field, cell: [i32; 2], frac: [f64; 2], i: i32) -> [f64; 3] {
+    let p = octave_2d(cell, frac, i);
+    let mut sum = [0.0; 3];
+    for dy in -1..=1 {
+        for dx in -1..=1 {
+            let home = [p.cell[0].wrapping_add(dx), p.cell[1].wrapping_add(dy)];
+            let words = lattice_hash_2d(home, octave_seed(field.seed, i));
+            if f64::from(words[0] >> 16) / 65536.0 >= field.shape {
+                continue;
+            }
+            let radius = 0.15 + 0.25 * (f64::from(words[1] >> 16) / 65536.0).powi(2);
+            let middle = words.map(|w| 0.25 + 0.5 * f64::from(w & 0xffff) / 65536.0);
+            let away = [
+                p.frac[0] - f64::from(dx) - middle[0],
+                p.frac[1] - f64::from(dy) - middle[1],
+            ];
+            let distance = away[0].hypot(away[1]);
+            let [value, slope] = crater(distance / radius);
+            sum[0] += radius * value;
+            for k in 0..2 {
+                // The middle of a bowl is level.
+                sum[k + 1] += octave_frequency(i) * slope * away[k] / distance.max(1e-12);
+            }
+        }
+    }
+    sum
+}
+
+/// The first k octaves with slopes per cell, and the weight that the next inherits, with its slopes.
+fn first_octaves(
+    field: &Field,
+    kind: i32,
+    cell: [i32; 2],
+    frac: [f64; 2],
+    count: i32,
+) -> [[f64; 3]; 2] {
+    let hurst = -field.fall.log2();
+    let one = [1.0, 0.0, 0.0];
+    let fractal = |k: i32| match kind {
+        1 => hybrid_multifractal_2d_slope(cell, frac, k, hurst, field.shape, field.seed),
+        2 => ridged_multifractal_2d_slope(
+            cell,
+            frac,
+            k,
+            hurst,
+            field.shape,
+            field.detail,
+            field.seed,
+        ),
+        3 => {
+            let mut sum = [0.0; 3];
+            for i in 0..k {
+                let craters = crater_octave(field, cell, frac, i);
+                let noise = octave_noise_2d(cell, frac, i, field.seed);
+                for a in 0..3 {
+                    sum[a] += octave_amplitude(i, hurst) * (craters[a] + field.detail * noise[a]);
+                }
+            }
+            sum
+        }
+        _ => fbm_2d_slope(cell, frac, k, hurst, field.seed),
+    };
+    let sum = fractal(count);
+    if count == 0 || !(kind == 1 || kind == 2) {
+        return [sum, one];
+    }
+    // The last octave's term, from which the weight of the next follows.
+    let before = fractal(count - 1);
+    let factor = if kind == 2 {
+        field.shape / octave_amplitude(count - 1, hurst)
+    } else {
+        1.0
+    };
+    let weight: [f64; 3] = std::array::from_fn(|a| (sum[a] - before[a]) * factor);
+    [sum, if weight[0] >= 1.0 { one } else { weight }]
+}
+
+/// The field at an offset (x, z) from the eye, filtered by a footprint.
+pub fn ground(field: &Field, kind: i32, offset: [f64; 2], footprint: f64) -> Ground {
+    let place: [f64; 2] = std::array::from_fn(|k| field.frac[k] + offset[k] / field.wavelength);
+    let p = split_2d(field.cell, place);
+    if kind == 4 {
+        return mix(field, p.cell, p.frac, footprint);
+    }
+    let share = |i: i32| kept(field.wavelength / octave_frequency(i), footprint);
+    let whole = (0..field.octaves).take_while(|i| share(*i) >= 1.0).count() as i32;
+    // The mean over all that follows octave k, and the square of its slopes.
+    let held = |k: i32| {
+        let [sum, w] = first_octaves(field, kind, p.cell, p.frac, k);
+        if k == field.octaves {
+            return (sum, 0.0);
+        }
+        let (rest, bend) = (remainder(kind, field.mean, k), field.mean[3]);
+        let value = sum[0] + rest * w[0] * (1.0 + bend * (1.0 - w[0]));
+        let slope = rest * (1.0 + bend * (1.0 - 2.0 * w[0]));
+        let lost =
+            remainder(kind, field.lost, k).max(0.0) * w[0] * (1.0 + field.lost[3] * (1.0 - w[0]));
+        ([value, sum[1] + slope * w[1], sum[2] + slope * w[2]], lost)
+    };
+    let (mut value, mut lost) = held(whole);
+    if whole < field.octaves {
+        let keep = share(whole);
+        if keep > 0.0 {
+            let (next, next_lost) = held(whole + 1);
+            value = std::array::from_fn(|a| value[a] + keep * (next[a] - value[a]));
+            lost = next_lost + (1.0 - keep * keep) * (lost - next_lost);
+        }
+    }
+    scaled(field, value, lost.max(0.0))
+}
+
+fn scaled(field: &Field, value: [f64; 3], lost: f64) -> Ground {
+    let steepness = field.amplitude / field.wavelength;
+    Ground {
+        height: field.base + field.amplitude * value[0],
+        slope: [steepness * value[1], steepness * value[2]],
+        lost: steepness * steepness * lost,
+    }
+}
+
+/// Lowlands and jagged mountains.
+fn mix(field: &Field, cell: [i32; 2], frac: [f64; 2], footprint: f64) -> Ground {
+    let part = |level: i32, octaves: i32, seed: u32| -> [f64; 4] {
+        let mut sum = [0.0; 4];
+        for i in 0..octaves {
+            let at = octave_2d(cell, frac, level + i);
+            let n = super::noise::gradient_noise_2d_slope(
+                at.cell,
+                at.frac,
+                octave_seed(field.seed.wrapping_add(seed), i),
+            );
+            let f = octave_frequency(level + i);
+            let a = field.fall.powi(i);
+            let keep = kept(field.wavelength / f, footprint);
+            sum[0] += a * keep * n[0];
+            sum[1] += a * keep * f * n[1];
+            sum[2] += a * keep * f * n[2];
+            sum[3] += (1.0 - keep * keep) * field.lost[1] * (a * f).powi(2);
+        }
+        sum
+    };
+    let (fine, middle, coarse) = (part(3, field.octaves, 0), part(2, 3, 1), part(0, 1, 2));
+    let lift = (1.0 + middle[0]).max(0.0);
+    let m = field.shape.floor();
+    let power = lift.powf(m);
+    let bend = 0.1 * fine[0] * m * lift.powf(m - 1.0) + 0.2;
+    let value = std::array::from_fn(|a| match a {
+        0 => 0.1 * fine[0] * power + 0.2 * middle[0] + coarse[0],
+        _ => 0.1 * power * fine[a] + bend * middle[a] + coarse[a],
+    });
+    let lost = 0.01 * power * power * fine[3] + bend * bend * middle[3] + coarse[3];
+    scaled(field, value, lost)
+}
+
+/// A hit with the ground where the last step to it began.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refined {
+    /// Distance.
+    pub distance: f64,
+    /// Upward unit normal.
+    pub normal: [f64; 3],
+    /// The field there.
+    pub ground: Ground,
+}
+
+/// Steps of Newton's method from a distance `t` towards the field, by at most `most`.
+#[allow(clippy::too_many_arguments)]
+pub fn refined(
+    field: &Field,
+    kind: i32,
+    ground_radius: f64,
+    eye_altitude: f64,
+    origin: [f64; 3],
+    dir: [f64; 3],
+    t: f64,
+    pixel_angle: f64,
+    most: f64,
+    steps: i32,
+) -> Refined {
+    use super::math::{add, dot, normalize, scale};
+    use super::planet::{altitude_of, up_at};
+    let mut found = Refined {
+        distance: t,
+        normal: [0.0, 1.0, 0.0],
+        ground: Ground {
+            height: 0.0,
+            slope: [0.0; 2],
+            lost: 0.0,
+        },
+    };
+    for _ in 0..steps {
+        let at = add(origin, scale(dir, found.distance));
+        let here = ground(field, kind, [at[0], at[2]], pixel_angle * found.distance);
+        let clearance = altitude_of(ground_radius, eye_altitude, at) - here.height;
+        let gradient = add(
+            up_at(ground_radius, eye_altitude, at),
+            [-here.slope[0], 0.0, -here.slope[1]],
+        );
+        let fall = (-dot(gradient, dir)).max(0.02);
+        found = Refined {
+            distance: (found.distance + clearance / fall).clamp((t - most).max(0.0), t + most),
+            normal: normalize(gradient),
+            ground: here,
+        };
+    }
+    found
+}

@@ -1,0 +1,335 @@
+//! Height fields as plain data: which noise, how large, how rough.
+
+use serde::{Deserialize, Serialize};
+
+use super::calibrate;
+use super::ground::Prepared;
+use super::real::Real;
+use crate::error::Error;
+
+/// Where the field lies.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Domain {
+    /// x and z on an endless integer lattice.
+    #[default]
+    Plane,
+}
+
+/// What the field is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub enum Kind {
+    /// Sum of octaves (Leitner 2022, algorithm 1): the same roughness everywhere.
+    Fbm,
+    /// Hybrid multifractal (algorithm 2): low places stay smooth.
+    Hybrid {
+        /// Moves the noise towards positive values, in [0, 1]; 0.7 is usual.
+        offset: f64,
+    },
+    /// Ridged multifractal (algorithm 3, squared in every octave): sharp crests. The thesis's mountains.
+    Ridged {
+        /// Weight of an octave by the one before it, in [0, 4]; 2 is usual.
+        gain: f64,
+        /// Rounding of the crests, in [0, 1]; 0 keeps them sharp.
+        smoothness: f64,
+    },
+    /// Bowls with rims of all sizes on the octaves' lattices.
+    Craters {
+        /// Share of the cells that hold a crater, in [0, 1].
+        share: f64,
+        /// Height of the noise between craters, in [0, 1].
+        roughness: f64,
+    },
+    /// Lowlands and jagged mountains from Perlin noise at three scales. The wavelength is that of the finest of them; the coarsest has eight times as
+    /// much, and the heights are up to about 1.2 amplitudes for a power of 1.
+    Mix {
+        /// Power of the mountains, whole, in [1, 6].
+        mountains: f64,
+    },
+    /// The program's own WGSL function, put in the place of `veduta::terrain::height::height`. It has no bounds, and no height on the processor.
+    Own {
+        /// Handed on as the terrain's gain.
+        gain: f64,
+        /// Handed on as the terrain's smoothness.
+        smoothness: f64,
+    },
+}
+
+impl Kind {
+    /// The number that the modules know it by (`FIELD_..` of `veduta::terrain::field`).
+    pub fn number(self) -> i32 {
+        match self {
+            Kind::Fbm => 0,
+            Kind::Hybrid { .. } => 1,
+            Kind::Ridged { .. } => 2,
+            Kind::Craters { .. } => 3,
+            Kind::Mix { .. } => 4,
+            Kind::Own { .. } => 5,
+        }
+    }
+
+    /// Its two parameters.
+    pub(super) fn parameters(self) -> [f64; 2] {
+        match self {
+            Kind::Fbm => [0.0; 2],
+            Kind::Hybrid { offset } => [offset, 0.0],
+            Kind::Ridged { gain, smoothness } | Kind::Own { gain, smoothness } => {
+                [gain, smoothness]
+            }
+            Kind::Craters { share, roughness } => [share, roughness],
+            Kind::Mix { mountains } => [mountains, 0.0],
+        }
+    }
+}
+
+/// A height field.
+///
+/// ```
+/// use veduta::terrain::HeightField;
+/// use veduta::WorldPos;
+/// let field = HeightField::default().prepare::<f64>()?;
+/// // A hundred million metres from the origin, as one sample of a metre's width sees it.
+/// let far = WorldPos { cell: [100_000_000, 0, 7].into(), ..Default::default() };
+/// let ground = field.ground(far, 1.0);
+/// assert!((0.0..2800.0).contains(&ground.height));
+/// # Ok::<(), veduta::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeightField {
+    /// What it is made of.
+    pub kind: Kind,
+    /// Where it lies.
+    #[serde(default)]
+    pub domain: Domain,
+    /// Wavelength of the first octave (m), in [16, 1e6]; it is rounded to `f32`.
+    pub wavelength: f64,
+    /// Height of a value of 1 (m), in [0, 2e4].
+    pub amplitude: f64,
+    /// Height of a value of 0 (m), in [-2e4, 2e4].
+    #[serde(default)]
+    pub base: f64,
+    /// Octaves, in [1, 16].
+    pub octaves: u32,
+    /// Hurst exponent, in [0, 2]: octave i has the amplitude 2^(-i hurst).
+    pub hurst: f64,
+    /// Seed of the lattice.
+    #[serde(default)]
+    pub seed: u32,
+}
+
+impl Default for HeightField {
+    /// The mountains of the preset `thesis`, with sharp crests.
+    fn default() -> Self {
+        HeightField {
+            kind: Kind::Ridged {
+                gain: 2.0,
+                smoothness: 0.0,
+            },
+            domain: Domain::Plane,
+            wavelength: 8192.0,
+            amplitude: 1400.0,
+            base: 0.0,
+            octaves: 10,
+            hurst: 1.0,
+            seed: 1,
+        }
+    }
+}
+
+/// What holds everywhere on a field, whatever the footprint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bounds {
+    /// No height is below (m).
+    pub minimum: f64,
+    /// No height is above (m).
+    pub maximum: f64,
+    /// No slope is steeper (rise over run), where there is a slope.
+    pub lipschitz: f64,
+    /// No octave adds a steeper slope.
+    pub octaves: Vec<f64>,
+}
+
+/// No gradient noise in 2D has a steeper slope, per cell: the largest over all places and vectors is 2.9262.
+const NOISE_SLOPE: f64 = 2.927;
+
+/// The interval of a product.
+fn product([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
+    let all = [a * c, a * d, b * c, b * d];
+    [
+        all.iter().copied().fold(f64::INFINITY, f64::min),
+        all.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+    ]
+}
+
+/// Bounds of the value and of the slope per cell of every octave, for an fBm of so many octaves from a frequency on.
+fn fbm_bounds(octaves: u32, hurst: f64, frequency: f64) -> (f64, Vec<f64>) {
+    let amplitude = |i: u32| (-hurst * f64::from(i)).exp2();
+    (
+        (0..octaves).map(amplitude).sum(),
+        (0..octaves)
+            .map(|i| NOISE_SLOPE * amplitude(i) * frequency * f64::from(i).exp2())
+            .collect(),
+    )
+}
+
+impl HeightField {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] that names the field, its value and what is allowed.
+    pub fn check(&self) -> Result<(), Error> {
+        let within = |name: &str, value: f64, low: f64, high: f64, unit: &str| {
+            if (low..=high).contains(&value) {
+                return Ok(());
+            }
+            Err(Error::OutOfDomain {
+                name: format!("field.{name}"),
+                value: value.to_string(),
+                domain: format!("in [{low}, {high}]{unit}"),
+            })
+        };
+        within("wavelength", self.wavelength, 16.0, 1e6, " m")?;
+        within("amplitude", self.amplitude, 0.0, 2e4, " m")?;
+        within("base", self.base, -2e4, 2e4, " m")?;
+        within("octaves", f64::from(self.octaves), 1.0, 16.0, "")?;
+        within("hurst", self.hurst, 0.0, 2.0, "")?;
+        match self.kind {
+            Kind::Fbm => Ok(()),
+            Kind::Hybrid { offset } => within("kind.offset", offset, 0.0, 1.0, ""),
+            Kind::Ridged { gain, smoothness } | Kind::Own { gain, smoothness } => {
+                within("kind.gain", gain, 0.0, 4.0, "")?;
+                within("kind.smoothness", smoothness, 0.0, 1.0, "")
+            }
+            Kind::Craters { share, roughness } => {
+                within("kind.share", share, 0.0, 1.0, "")?;
+                within("kind.roughness", roughness, 0.0, 1.0, "")
+            }
+            Kind::Mix { mountains } => {
+                within("kind.mountains", mountains, 1.0, 6.0, "")?;
+                if mountains.fract() == 0.0 {
+                    return Ok(());
+                }
+                Err(Error::OutOfDomain {
+                    name: "field.kind.mountains".to_owned(),
+                    value: mountains.to_string(),
+                    domain: "whole".to_owned(),
+                })
+            }
+        }
+    }
+
+    /// Wavelength of the lattice (m): that of the coarsest noise, rounded as the device has it.
+    pub fn lattice_wavelength(&self) -> f64 {
+        let rounded = f64::from(self.wavelength as f32);
+        match self.kind {
+            Kind::Mix { .. } => 8.0 * rounded,
+            _ => rounded,
+        }
+    }
+
+    /// The field with all that follows from its numbers, in `f32` as the device computes it, or in `f64`.
+    ///
+    /// # Errors
+    /// As [`HeightField::check`].
+    pub fn prepare<T: Real>(&self) -> Result<Prepared<T>, Error> {
+        self.check()?;
+        Ok(Prepared::new(self, &calibrate::tails(self)))
+    }
+
+    /// What holds everywhere on it, by interval arithmetic from octave to octave.
+    ///
+    /// # Errors
+    /// As [`HeightField::check`]; [`Error::NotYet`] for a program's own function, of which nothing is known.
+    pub fn bounds(&self) -> Result<Bounds, Error> {
+        self.check()?;
+        let fall = |i: u32| (-self.hurst * f64::from(i)).exp2();
+        let frequency = |i: u32| f64::from(i).exp2();
+        let (mut values, mut slopes) = ([0.0_f64; 2], Vec::new());
+        match self.kind {
+            Kind::Fbm => {
+                let (sum, each) = fbm_bounds(self.octaves, self.hurst, 1.0);
+                (values, slopes) = ([-sum, sum], each);
+            }
+            Kind::Craters { roughness, .. } => {
+                // At most four bowls and nine rims meet in a point.
+                for i in 0..self.octaves {
+                    values[0] -= fall(i) * (4.0 * 0.4 * 0.4 + roughness);
+                    values[1] += fall(i) * (9.0 * 0.4 * 0.08 + roughness);
+                    let slope = 4.0 * 0.93 + 5.0 * 0.13 + roughness * NOISE_SLOPE;
+                    slopes.push(fall(i) * frequency(i) * slope);
+                }
+            }
+            Kind::Hybrid { offset } => {
+                let (mut weight, mut steep) = ([1.0_f64; 2], 0.0);
+                for i in 0..self.octaves {
+                    let a = fall(i);
+                    let signal = [a * (offset - 1.0), a * (offset + 1.0)];
+                    let most = weight[0].abs().max(weight[1].abs());
+                    steep = most * a * frequency(i) * NOISE_SLOPE + signal[1] * steep;
+                    weight = product(weight, signal);
+                    values = [values[0] + weight[0], values[1] + weight[1]];
+                    slopes.push(steep);
+                    weight = weight.map(|w| w.min(1.0));
+                }
+            }
+            Kind::Ridged { gain, smoothness } => {
+                let top = (1.0 - smoothness.sqrt()).powi(2);
+                let deep = (1.0 - (1.0 + smoothness).sqrt()).powi(2);
+                let most = top.max(deep);
+                let mut steep = 0.0;
+                for i in 0..self.octaves {
+                    // |d ridge^2| is at most 2 |ridge| |dn|.
+                    steep = 2.0 * most.sqrt() * frequency(i) * NOISE_SLOPE + most * gain * steep;
+                    slopes.push(fall(i) * steep);
+                    values[1] += fall(i) * most;
+                }
+            }
+            Kind::Mix { mountains } => {
+                let (fine, fine_slopes) = fbm_bounds(self.octaves, self.hurst, 8.0);
+                let (middle, middle_slopes) = fbm_bounds(3, self.hurst, 4.0);
+                let lift = (1.0 + middle).powf(mountains);
+                let sum = 0.1 * fine * lift + 0.2 * middle + 1.0;
+                values = [-sum, sum];
+                let bend = 0.1 * fine * mountains * (1.0 + middle).powf(mountains - 1.0) + 0.2;
+                slopes.push(NOISE_SLOPE);
+                slopes.extend(middle_slopes.iter().map(|s| s * bend));
+                slopes.extend(fine_slopes.iter().map(|s| s * 0.1 * lift));
+            }
+            Kind::Own { .. } => {
+                return Err(Error::NotYet("bounds of a program's own height".to_owned()));
+            }
+        }
+        let steepness = self.amplitude / self.lattice_wavelength();
+        let octaves: Vec<f64> = slopes.iter().map(|s| s * steepness).collect();
+        Ok(Bounds {
+            minimum: self.base + self.amplitude * values[0],
+            maximum: self.base + self.amplitude * values[1],
+            lipschitz: octaves.iter().sum(),
+            octaves,
+        })
+    }
+
+    /// Reads a field from RON, for instance `(kind: Ridged(gain: 2, smoothness: 0), wavelength: 8192, amplitude: 1400, octaves: 10, hurst: 1)`.
+    ///
+    /// # Errors
+    /// [`Error::Ron`] with line and column; as [`HeightField::check`].
+    pub fn from_ron(text: &str) -> Result<HeightField, Error> {
+        let field: HeightField =
+            ron::from_str(text).map_err(|fault| Error::Ron(format!("no height field: {fault}")))?;
+        field.check()?;
+        Ok(field)
+    }
+
+    /// Writes the field so that [`HeightField::from_ron`] gives an equal one.
+    ///
+    /// # Errors
+    /// As [`HeightField::check`].
+    pub fn to_ron(&self) -> Result<String, Error> {
+        self.check()?;
+        ron::to_string(self)
+            .map_err(|fault| Error::Ron(format!("the field cannot be written: {fault}")))
+    }
+}

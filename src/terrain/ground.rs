@@ -1,0 +1,319 @@
+//! The field at a place, in the device's order of operations.
+
+use super::calibrate::Tails;
+use super::field::{HeightField, Kind};
+use super::noise::{Place, craters, gradient_noise, octave_seed};
+use super::real::Real;
+use crate::view::WorldPos;
+
+/// The filtered field at a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ground<T> {
+    /// Height (m).
+    pub height: T,
+    /// Slope (dh/dx, dh/dz).
+    pub slope: [T; 2],
+    /// Mean square of the slopes that the filter took off.
+    pub lost: T,
+}
+
+impl<T: Real> Ground<T> {
+    /// The upward unit normal.
+    pub fn normal(&self) -> [T; 3] {
+        let [x, z] = self.slope;
+        let one = T::of(1.0);
+        let length = (one + x * x + z * z).root();
+        [-x / length, one / length, -z / length]
+    }
+}
+
+/// A field with all that follows from its numbers. In `f32` it does what the device does, operation by operation; see [`HeightField::prepare`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prepared<T> {
+    kind: Kind,
+    octaves: i32,
+    seed: u32,
+    lattice: f64,
+    /// Wavelength of the lattice (m).
+    pub(super) wavelength: T,
+    pub(super) amplitude: T,
+    pub(super) base: T,
+    pub(super) fall: T,
+    pub(super) shape: T,
+    pub(super) detail: T,
+    /// Total, first, ratio, bend.
+    pub(super) mean: [T; 4],
+    pub(super) lost: [T; 4],
+}
+
+impl<T: Real> Prepared<T> {
+    pub(super) fn new(field: &HeightField, tails: &Tails) -> Prepared<T> {
+        let [shape, detail] = field.kind.parameters();
+        let four = |t: &super::calibrate::Tail| [t.total, t.first, t.ratio, t.bend].map(T::of);
+        Prepared {
+            kind: field.kind,
+            octaves: field.octaves as i32,
+            seed: field.seed,
+            lattice: field.lattice_wavelength(),
+            wavelength: T::of(field.lattice_wavelength()),
+            amplitude: T::of(field.amplitude),
+            base: T::of(field.base),
+            fall: T::of((-field.hurst).exp2()),
+            shape: T::of(shape),
+            detail: T::of(detail),
+            mean: four(&tails.mean),
+            lost: four(&tails.lost),
+        }
+    }
+
+    /// What it is made of.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Octaves.
+    pub fn octaves(&self) -> i32 {
+        self.octaves
+    }
+
+    /// Seed of the lattice.
+    pub fn seed(&self) -> u32 {
+        self.seed
+    }
+
+    /// Where a position lies on the field's lattice, exact to the last place of the fraction at any distance from the origin.
+    pub fn place(&self, position: WorldPos) -> Place<T> {
+        const UNIT: f64 = (1_u64 << 20) as f64;
+        let p = position.normalized();
+        let period = (self.lattice * UNIT).round() as i128;
+        let axis = |axis: usize| {
+            let fraction = f64::from(p.frac[axis]) * UNIT;
+            let at = (i128::from(p.cell[axis]) << 20) + fraction.floor() as i128;
+            let cell = at.div_euclid(period);
+            let rest = at.rem_euclid(period) as f64 + fraction.fract();
+            let frac = T::of(rest / period as f64);
+            // Rounding may reach 1, which is the next cell.
+            let over = frac >= T::of(1.0);
+            let wrapped = (cell + i128::from(over)).rem_euclid(1 << 32) as u32;
+            let frac = if over { T::of(0.0) } else { frac };
+            (wrapped.cast_signed(), frac)
+        };
+        let (x, z) = (axis(0), axis(2));
+        Place {
+            cell: [x.0, z.0],
+            frac: [x.1, z.1],
+        }
+    }
+
+    /// The field at a position, filtered by a footprint (m); 0 takes it as it is. NaN for a program's own function, which only the device knows.
+    pub fn ground(&self, position: WorldPos, footprint: T) -> Ground<T> {
+        self.ground_at(self.place(position), footprint)
+    }
+
+    /// The field at an offset (x, z) in metres from a place, as the device has it from the eye's.
+    pub fn ground_from(&self, eye: Place<T>, offset: [T; 2], footprint: T) -> Ground<T> {
+        let frac = std::array::from_fn(|k| eye.frac[k] + offset[k] / self.wavelength);
+        self.ground_at(Place::new(eye.cell, frac), footprint)
+    }
+
+    /// The field at a place on its lattice.
+    pub fn ground_at(&self, place: Place<T>, footprint: T) -> Ground<T> {
+        match self.kind {
+            Kind::Own { .. } => {
+                let none = T::of(f64::NAN);
+                Ground {
+                    height: none,
+                    slope: [none; 2],
+                    lost: none,
+                }
+            }
+            Kind::Mix { .. } => self.mix_sum(place, footprint),
+            _ => self.octave_sum(place, footprint),
+        }
+    }
+
+    fn octave_sum(&self, start: Place<T>, footprint: T) -> Ground<T> {
+        let [zero, one, two] = [0.0, 1.0, 2.0].map(T::of);
+        let mut p = start;
+        let mut reach = self.wavelength / footprint.most(T::of(1e-6));
+        let (mut amplitude, mut frequency) = (one, one);
+        let mut weight = [one, zero, zero];
+        let mut sum = [zero; 3];
+        let [mut tail, mut tail_step, ..] = self.mean;
+        let [mut rough, mut rough_step, ..] = self.lost;
+        let mut mean = [tail, zero, zero];
+        let mut lost = rough;
+        for i in 0..self.octaves {
+            if reach <= one {
+                break;
+            }
+            let x = (reach - one).least(one);
+            let keep = x * x * (T::of(3.0) - two * x);
+            let seed = octave_seed(self.seed, i);
+            let q = p.shifted(i);
+            p = p.finer();
+            let n = gradient_noise(q, seed);
+            let mut term = [n[0], frequency * n[1], frequency * n[2]];
+            match self.kind {
+                Kind::Ridged { .. } => {
+                    let size = if self.detail > zero {
+                        (n[0] * n[0] + self.detail).root()
+                    } else {
+                        n[0].size()
+                    };
+                    let ridge = one - size;
+                    let square = ridge * ridge;
+                    let off = -two * ridge * (n[0] / size.most(T::of(1e-30))) * frequency;
+                    let along = |k: usize| off * weight[0] * n[k] + square * weight[k];
+                    term = [square * weight[0], along(1), along(2)];
+                    let next = term.map(|t| self.shape * t);
+                    weight = if next[0] >= one {
+                        [one, zero, zero]
+                    } else {
+                        next
+                    };
+                    term = term.map(|t| t * amplitude);
+                }
+                Kind::Hybrid { .. } => {
+                    let signal = [
+                        amplitude * (n[0] + self.shape),
+                        amplitude * (frequency * n[1]),
+                        amplitude * (frequency * n[2]),
+                    ];
+                    let along = |k: usize| weight[0] * signal[k] + signal[0] * weight[k];
+                    term = [weight[0] * signal[0], along(1), along(2)];
+                    weight = if term[0] >= one {
+                        [one, zero, zero]
+                    } else {
+                        term
+                    };
+                }
+                Kind::Craters { .. } => {
+                    let bowls = craters(q, self.shape, seed);
+                    let both: [T; 3] = std::array::from_fn(|k| bowls[k] + self.detail * n[k]);
+                    term = [
+                        amplitude * both[0],
+                        amplitude * (frequency * both[1]),
+                        amplitude * (frequency * both[2]),
+                    ];
+                }
+                _ => term = term.map(|t| t * amplitude),
+            }
+            for k in 0..3 {
+                sum[k] += term[k];
+            }
+            if let Kind::Hybrid { .. } = self.kind {
+                tail *= self.mean[2];
+                rough *= self.lost[2];
+            } else {
+                tail -= tail_step;
+                rough -= rough_step;
+            }
+            tail_step *= self.mean[2];
+            rough_step *= self.lost[2];
+            frequency *= two;
+            amplitude *= self.fall;
+            reach *= T::of(0.5);
+            let left = if i + 1 == self.octaves { zero } else { one };
+            let rest = left * tail * (one + self.mean[3] * (one - weight[0]));
+            let slope = left * tail * (one + self.mean[3] * (one - two * weight[0]));
+            let after = [
+                sum[0] + rest * weight[0],
+                sum[1] + slope * weight[1],
+                sum[2] + slope * weight[2],
+            ];
+            let after_lost =
+                left * rough.most(zero) * weight[0] * (one + self.lost[3] * (one - weight[0]));
+            for k in 0..3 {
+                mean[k] = mean[k] * (one - keep) + after[k] * keep;
+            }
+            lost = (after_lost + (one - keep * keep) * (lost - after_lost)).most(zero);
+        }
+        self.scaled(mean, lost)
+    }
+
+    fn scaled(&self, value: [T; 3], lost: T) -> Ground<T> {
+        let steepness = self.amplitude / self.wavelength;
+        Ground {
+            height: self.base + self.amplitude * value[0],
+            slope: [steepness * value[1], steepness * value[2]],
+            lost: steepness * steepness * lost,
+        }
+    }
+
+    /// A part of the mix: value, slope per cell, and the mean square of the slopes left out.
+    fn mix_part(
+        &self,
+        start: Place<T>,
+        [level, octaves]: [i32; 2],
+        total: T,
+        seed: u32,
+        footprint: T,
+    ) -> [T; 4] {
+        let [zero, one, two] = [0.0, 1.0, 2.0].map(T::of);
+        let mut p = start;
+        let mut frequency = one;
+        for _ in 0..level {
+            p = p.finer();
+            frequency *= two;
+        }
+        let mut reach = self.wavelength / (frequency * footprint.most(T::of(1e-6)));
+        let mut amplitude = one;
+        let mut rough_step = self.lost[1] * frequency * frequency;
+        let mut rough = total;
+        let mut sum = [zero; 3];
+        let mut lost = rough;
+        for i in 0..octaves {
+            if reach <= one {
+                break;
+            }
+            let x = (reach - one).least(one);
+            let keep = x * x * (T::of(3.0) - two * x);
+            let n = gradient_noise(p.shifted(level + i), octave_seed(seed, i));
+            p = p.finer();
+            let scale = amplitude * keep;
+            sum[0] += scale * n[0];
+            sum[1] += scale * (frequency * n[1]);
+            sum[2] += scale * (frequency * n[2]);
+            rough = if i + 1 == octaves {
+                zero
+            } else {
+                rough - rough_step
+            };
+            lost = (rough + (one - keep * keep) * rough_step).most(zero);
+            rough_step *= self.lost[2];
+            frequency *= two;
+            amplitude *= self.fall;
+            reach *= T::of(0.5);
+        }
+        [sum[0], sum[1], sum[2], lost]
+    }
+
+    fn mix_sum(&self, start: Place<T>, footprint: T) -> Ground<T> {
+        let [zero, one] = [0.0, 1.0].map(T::of);
+        let [tenth, fifth] = [0.1, 0.2].map(T::of);
+        let part = |shape: [i32; 2], total: T, seed: u32| {
+            self.mix_part(start, shape, total, self.seed.wrapping_add(seed), footprint)
+        };
+        let fine = part([3, self.octaves], self.lost[0], 0);
+        let middle = part([2, 3], self.mean[0], 1);
+        let coarse = part([0, 1], self.lost[1], 2);
+        let lift = (one + middle[0]).most(zero);
+        let (mut power, mut below) = (one, zero);
+        for _ in 0..self.shape.wide() as i32 {
+            below = power;
+            power *= lift;
+        }
+        let bend = tenth * fine[0] * self.shape * below;
+        let along = |k: usize| tenth * power * fine[k] + (bend + fifth) * middle[k] + coarse[k];
+        let value = [
+            tenth * fine[0] * power + fifth * middle[0] + coarse[0],
+            along(1),
+            along(2),
+        ];
+        let lost = T::of(0.01) * power * power * fine[3]
+            + (bend + fifth) * (bend + fifth) * middle[3]
+            + coarse[3];
+        self.scaled(value, lost)
+    }
+}

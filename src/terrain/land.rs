@@ -1,0 +1,172 @@
+//! Land as a file has it: a height field on a planet. Those that come with the crate.
+
+use serde::{Deserialize, Serialize};
+
+use super::field::HeightField;
+use crate::error::Error;
+
+fn earth() -> f64 {
+    6_360_000.0
+}
+
+/// What the ground is made of: rock, and snow where it is flat.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Material {
+    /// Albedo of the darkest rock.
+    pub rock_dark: [f32; 3],
+    /// Albedo of the lightest rock.
+    pub rock_light: [f32; 3],
+    /// Wavelength of the coarsest rock texture (m), in [1, 1e5].
+    pub rock_wavelength: f32,
+    /// Albedo of snow.
+    pub snow: [f32; 3],
+    /// Slope (1 - normal.y) up to which snow covers everything; below -1 there is none.
+    pub snow_edge_low: f32,
+    /// Slope from which no snow lies.
+    pub snow_edge_high: f32,
+    /// How irregular the border of the snow is, in [0, 1].
+    pub snow_noise: f32,
+}
+
+impl Default for Material {
+    /// The rock and the snow of the preset `thesis`.
+    fn default() -> Self {
+        Material {
+            rock_dark: [0.10, 0.09, 0.08],
+            rock_light: [0.34, 0.30, 0.26],
+            rock_wavelength: 32.0,
+            snow: [0.85, 0.87, 0.90],
+            snow_edge_low: 0.10,
+            snow_edge_high: 0.32,
+            snow_noise: 0.15,
+        }
+    }
+}
+
+impl Material {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] that names the field, its value and what is allowed.
+    pub fn check(&self) -> Result<(), Error> {
+        let within = |name: &str, value: f32, low: f32, high: f32| {
+            if (low..=high).contains(&value) {
+                return Ok(());
+            }
+            Err(Error::OutOfDomain {
+                name: format!("material.{name}"),
+                value: value.to_string(),
+                domain: format!("in [{low}, {high}]"),
+            })
+        };
+        for (name, albedo) in [
+            ("rock_dark", self.rock_dark),
+            ("rock_light", self.rock_light),
+            ("snow", self.snow),
+        ] {
+            for channel in albedo {
+                within(name, channel, 0.0, 1.0)?;
+            }
+        }
+        within("rock_wavelength", self.rock_wavelength, 1.0, 1e5)?;
+        within("snow_edge_low", self.snow_edge_low, -10.0, 2.0)?;
+        within("snow_edge_high", self.snow_edge_high, -10.0, 2.0)?;
+        within("snow_noise", self.snow_noise, 0.0, 1.0)
+    }
+}
+
+/// A height field on a planet.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Land {
+    /// The heights above the planet's radius.
+    pub field: HeightField,
+    /// Radius of the planet (m), in [1e5, 1e9]; the plane of the field is bent to it below the eye.
+    #[serde(default = "earth")]
+    pub planet_radius: f64,
+    /// What it is made of.
+    #[serde(default)]
+    pub material: Material,
+}
+
+impl Default for Land {
+    /// The mountains of the preset `thesis` on the Earth.
+    fn default() -> Self {
+        Land {
+            field: HeightField::default(),
+            planet_radius: earth(),
+            material: Material::default(),
+        }
+    }
+}
+
+macro_rules! shipped {
+    ($($name:literal),+ $(,)?) => {
+        /// The names with their texts, the default first.
+        const SHIPPED: &[(&str, &str)] = &[
+            $(($name, include_str!(concat!("../../presets/terrains/", $name, ".ron")))),+
+        ];
+    };
+}
+
+shipped!("thesis", "alps", "hills", "islands", "lowlands", "moon");
+
+impl Land {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] that names the field, its value and what is allowed.
+    pub fn check(&self) -> Result<(), Error> {
+        self.field.check()?;
+        self.material.check()?;
+        if (1e5..=1e9).contains(&self.planet_radius) {
+            return Ok(());
+        }
+        Err(Error::OutOfDomain {
+            name: "land.planet_radius".to_owned(),
+            value: self.planet_radius.to_string(),
+            domain: "in [1e5, 1e9] m".to_owned(),
+        })
+    }
+
+    /// The names that [`Land::named`] knows, the default first.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        SHIPPED.iter().map(|(name, _)| *name)
+    }
+
+    /// A land that comes with the crate.
+    ///
+    /// # Errors
+    /// [`Error::UnknownLand`].
+    pub fn named(name: &str) -> Result<Land, Error> {
+        match SHIPPED.iter().find(|(known, _)| *known == name) {
+            Some((_, text)) => Land::from_ron(text),
+            None => Err(Error::UnknownLand {
+                name: name.to_owned(),
+                known: Land::names().map(str::to_owned).collect(),
+            }),
+        }
+    }
+
+    /// Reads a land as the files of `presets/terrains` have it.
+    ///
+    /// # Errors
+    /// [`Error::Ron`] with line and column; as [`Land::check`].
+    pub fn from_ron(text: &str) -> Result<Land, Error> {
+        let land: Land =
+            ron::from_str(text).map_err(|fault| Error::Ron(format!("no land: {fault}")))?;
+        land.check()?;
+        Ok(land)
+    }
+
+    /// Writes the land so that [`Land::from_ron`] gives an equal one.
+    ///
+    /// # Errors
+    /// As [`Land::check`].
+    pub fn to_ron(&self) -> Result<String, Error> {
+        self.check()?;
+        ron::ser::to_string_pretty(self, ron::ser::PrettyConfig::new().depth_limit(2))
+            .map_err(|fault| Error::Ron(format!("the land cannot be written: {fault}")))
+    }
+}

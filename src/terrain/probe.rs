@@ -1,0 +1,148 @@
+//! Heights of given places on the device: a query, not a part of a frame.
+
+use super::field::HeightField;
+use super::ground::{Ground, Prepared};
+use super::noise::Place;
+use crate::device::{Gpu, read_staging};
+use crate::error::Error;
+use crate::program::{Pipeline, PipelineOptions, ProgramSet};
+use crate::programs::blocks::Field as FieldBlock;
+use crate::view::WorldPos;
+
+impl Prepared<f32> {
+    /// The block `Field` of the modules, for an eye at a place.
+    pub fn block(&self, eye: Place<f32>) -> FieldBlock {
+        FieldBlock {
+            cell: eye.cell,
+            frac: eye.frac,
+            wavelength: self.wavelength,
+            amplitude: self.amplitude,
+            base: self.base,
+            fall: self.fall,
+            shape: self.shape,
+            detail: self.detail,
+            octaves: self.octaves(),
+            seed: self.seed(),
+            mean: self.mean,
+            lost: self.lost,
+        }
+    }
+}
+
+/// Bytes of a place in the buffer, and of a result.
+const ROW: usize = 24;
+const RESULT: usize = 16;
+
+/// Places of one dispatch.
+const CHUNK: usize = 1 << 16;
+
+/// The field at positions, filtered by a footprint (m), as the device computes it. Submits and waits.
+///
+/// # Errors
+/// As [`HeightField::check`]; [`Error::OutOfDomain`] for a footprint that is not finite or below 0; the faults of [`ProgramSet::get`] and of making
+/// the pipeline; [`Error::Device`].
+pub fn heights(
+    gpu: &Gpu,
+    programs: &ProgramSet,
+    field: &HeightField,
+    positions: &[WorldPos],
+    footprint: f32,
+) -> Result<Vec<Ground<f32>>, Error> {
+    let prepared = field.prepare::<f32>()?;
+    if !(footprint >= 0.0 && footprint.is_finite()) {
+        return Err(Error::OutOfDomain {
+            name: "footprint".to_owned(),
+            value: footprint.to_string(),
+            domain: "finite and at least 0 m".to_owned(),
+        });
+    }
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    let ready = programs.get("terrain_heights", &[])?.pipeline(
+        device,
+        &PipelineOptions {
+            constants: &[("FIELD_KIND", f64::from(field.kind.number()))],
+            ..Default::default()
+        },
+    )?;
+    let Pipeline::Compute(pipeline) = ready.pipeline else {
+        return Err(Error::MissingStage {
+            program: "terrain_heights".to_owned(),
+        });
+    };
+    let buffer = |label, size: usize, usage| {
+        device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: size as u64,
+            usage,
+            mapped_at_creation: false,
+        })
+    };
+    use wgpu::BufferUsages as Usage;
+    let block = prepared.block(Place {
+        cell: [0; 2],
+        frac: [0.0; 2],
+    });
+    let uniform = buffer(
+        "veduta field",
+        FieldBlock::SIZE,
+        Usage::UNIFORM | Usage::COPY_DST,
+    );
+    queue.write_buffer(&uniform, 0, &block.to_bytes());
+    let mut results = Vec::with_capacity(positions.len());
+    for part in positions.chunks(CHUNK) {
+        let mut rows = Vec::with_capacity(part.len() * ROW);
+        for position in part {
+            let place = prepared.place(*position);
+            rows.extend(place.cell.iter().flat_map(|c| c.to_le_bytes()));
+            rows.extend(place.frac.iter().flat_map(|f| f.to_le_bytes()));
+            rows.extend(footprint.to_le_bytes());
+            rows.extend([0; 4]);
+        }
+        let input = buffer(
+            "veduta places",
+            rows.len(),
+            Usage::STORAGE | Usage::COPY_DST,
+        );
+        queue.write_buffer(&input, 0, &rows);
+        let size = part.len() * RESULT;
+        let output = buffer("veduta heights", size, Usage::STORAGE | Usage::COPY_SRC);
+        let staging = buffer("veduta read back", size, Usage::COPY_DST | Usage::MAP_READ);
+        let groups: Vec<wgpu::BindGroup> = ready
+            .bind_group_layouts
+            .iter()
+            .zip([&uniform, &input, &output])
+            .map(|(layout, buffer)| {
+                device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some("veduta heights"),
+                    layout,
+                    entries: &[wgpu::BindGroupEntry {
+                        binding: 0,
+                        resource: buffer.as_entire_binding(),
+                    }],
+                })
+            })
+            .collect();
+        let mut encoder = device.create_command_encoder(&Default::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&pipeline);
+            for (index, group) in (0..).zip(&groups) {
+                pass.set_bind_group(index, group, &[]);
+            }
+            pass.dispatch_workgroups(part.len().div_ceil(64) as u32, 1, 1);
+        }
+        encoder.copy_buffer_to_buffer(&output, 0, &staging, 0, size as u64);
+        queue.submit([encoder.finish()]);
+        let data = read_staging(device, &staging)?;
+        results.extend(data.chunks_exact(RESULT).map(|row| {
+            let number =
+                |k: usize| f32::from_le_bytes([row[k], row[k + 1], row[k + 2], row[k + 3]]);
+            Ground {
+                height: number(0),
+                lost: number(4),
+                slope: [number(8), number(12)],
+            }
+        }));
+    }
+    Ok(results)
+}

@@ -1,0 +1,361 @@
+//! The ground in a host's own pass, with its depth.
+
+use glam::Vec3;
+
+use super::clipmap::{Clipmap, ClipmapOptions, group};
+use super::land::Land;
+use crate::error::Error;
+use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
+use crate::program::{Pipeline, PipelineOptions, ProgramSet};
+use crate::programs::blocks::{Field as FieldBlock, Rock as RockBlock, TerrainView as ViewBlock};
+use crate::settings::{Preset, Settings};
+use crate::view::View;
+
+/// Irradiances on the ground, in the picture's own unit. A host that has an atmosphere takes them from its `SkyQuery`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TerrainLights {
+    /// Of the sun on a plane across its direction, behind the air.
+    pub sun: Vec3,
+    /// Of the sky on level ground.
+    pub sky: Vec3,
+    /// Of light from the ground, on a plane that faces away from the sun.
+    pub bounce: Vec3,
+}
+
+impl TerrainLights {
+    /// Lights of a clear day for a sun of this irradiance, as in the preset `thesis`.
+    pub fn clear(sun: Vec3) -> TerrainLights {
+        TerrainLights {
+            sun: sun * Vec3::new(1.0, 0.9, 0.75),
+            sky: sun * Vec3::new(0.05, 0.08, 0.13),
+            bounce: sun * Vec3::new(0.13, 0.11, 0.09),
+        }
+    }
+}
+
+/// Choices that are made once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TerrainOptions {
+    /// The quality: `low` bakes half as finely and has one fractal in its rock.
+    pub preset: Preset,
+    /// The ground.
+    pub land: Land,
+    /// Distance at which rays end (m), in [100, 4e6].
+    pub far: f64,
+    /// Texels of a level's side, see [`ClipmapOptions::texels`]; 0 leaves it to the preset: 512, or 256 for `low`.
+    pub texels: u32,
+}
+
+impl Default for TerrainOptions {
+    /// The mountains of the preset `thesis` with the preset `high`, to 60 km.
+    fn default() -> Self {
+        TerrainOptions {
+            preset: Preset::High,
+            land: Land::default(),
+            far: 60_000.0,
+            texels: 0,
+        }
+    }
+}
+
+/// Draws a height field over a host's pass, and its depth.
+///
+/// ```no_run
+/// # fn frame(device: &wgpu::Device, queue: &wgpu::Queue, encoder: &mut wgpu::CommandEncoder, target: &wgpu::TextureView, depth: &wgpu::TextureView)
+/// # -> Result<(), veduta::Error> {
+/// use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
+/// let targets = veduta::Targets { depth_format: Some(wgpu::TextureFormat::Depth32Float), ..Default::default() };
+/// let mut terrain = Terrain::new(device, veduta::programs(), &targets, &TerrainOptions::default())?;
+/// let view = veduta::View::default();
+/// // Every frame: heights are baked only where the eye has uncovered ground.
+/// let work = terrain.prepare(queue, encoder, &view, &TerrainLights::clear(view.sun.irradiance), 144)?;
+/// println!("{} levels baked", work.bakes);
+/// let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+///     color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+///         view: target, depth_slice: None, resolve_target: None, ops: wgpu::Operations::default(),
+///     })],
+///     depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+///         view: depth, depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }), stencil_ops: None,
+///     }),
+///     ..Default::default()
+/// });
+/// let _ = terrain.draw_opaque(&mut pass);
+/// # Ok(()) }
+/// ```
+#[derive(Debug)]
+pub struct Terrain {
+    clipmap: Clipmap,
+    land: Land,
+    far: f64,
+    depth: Depth,
+    pipeline: wgpu::RenderPipeline,
+    groups: Vec<wgpu::BindGroup>,
+    view: wgpu::Buffer,
+    field: wgpu::Buffer,
+    rock: wgpu::Buffer,
+    held: [Vec<u8>; 3],
+}
+
+impl Terrain {
+    /// Builds pipelines and makes room for heights.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for targets that it cannot draw into or that have no depth, and for options; the faults of [`Settings::resolve`] and [`Clipmap::new`].
+    pub fn new(
+        device: &wgpu::Device,
+        programs: &ProgramSet,
+        targets: &Targets,
+        options: &TerrainOptions,
+    ) -> Result<Terrain, Error> {
+        targets.check()?;
+        if targets.projection == Projection::Orthographic {
+            return Err(Error::OutOfDomain {
+                name: "targets.projection".to_owned(),
+                value: "Orthographic".to_owned(),
+                domain: "Perspective: footprints grow with the distance".to_owned(),
+            });
+        }
+        let Some(depth_format) = targets.depth_format else {
+            return Err(Error::OutOfDomain {
+                name: "targets.depth_format".to_owned(),
+                value: "None".to_owned(),
+                domain: "the format of a depth buffer, which the terrain writes".to_owned(),
+            });
+        };
+        let output = output_of(targets.color_format)?;
+        let settings = Settings::resolve(programs, &options.preset, None, &[])?;
+        let low = settings.number("TEXTURE_LOW_QUALITY").unwrap_or(0.0) != 0.0;
+        let texels = match options.texels {
+            0 if low => 256,
+            0 => 512,
+            n => n,
+        };
+        let clipmap = Clipmap::new(
+            device,
+            programs,
+            &options.land,
+            &ClipmapOptions {
+                texels,
+                levels: 16,
+                reach: options.far,
+            },
+        )?;
+        let constants = [
+            ("FIELD_KIND", f64::from(options.land.field.kind.number())),
+            ("OUTPUT", output),
+            ("MAX_MARCHING_STEPS", if low { 250.0 } else { 500.0 }),
+            ("MAX_MARCHING_STEPS_SHADOW", if low { 24.0 } else { 60.0 }),
+            ("REFINE_STEPS", if low { 1.0 } else { 2.0 }),
+            ("ROCK_CHEAP", f64::from(u8::from(low))),
+        ];
+        let ready = programs.get("terrain", &[])?.pipeline(
+            device,
+            &PipelineOptions {
+                targets: &[Some(targets.color_format.into())],
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: depth_format,
+                    depth_write_enabled: Some(true),
+                    depth_compare: Some(match targets.depth {
+                        Depth::Normal => wgpu::CompareFunction::Less,
+                        Depth::Reversed | Depth::ReversedInfinite => wgpu::CompareFunction::Greater,
+                    }),
+                    stencil: Default::default(),
+                    bias: Default::default(),
+                }),
+                sample_count: targets.sample_count,
+                constants: &constants,
+                ..Default::default()
+            },
+        )?;
+        let Pipeline::Render(pipeline) = ready.pipeline else {
+            return Err(Error::MissingStage {
+                program: "terrain".to_owned(),
+            });
+        };
+        let buffer = |label, size: usize| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: size as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let view = buffer("veduta terrain view", ViewBlock::SIZE);
+        let field = buffer("veduta field", FieldBlock::SIZE);
+        let rock = buffer("veduta rock", RockBlock::SIZE);
+        let [heights, fine, coarse, places] = &clipmap.views;
+        let texture = wgpu::BindingResource::TextureView;
+        let groups = vec![
+            group(
+                device,
+                &ready.bind_group_layouts[0],
+                &[
+                    view.as_entire_binding(),
+                    field.as_entire_binding(),
+                    clipmap.clip().as_entire_binding(),
+                    rock.as_entire_binding(),
+                ],
+            ),
+            group(
+                device,
+                &ready.bind_group_layouts[1],
+                &[
+                    texture(heights),
+                    texture(fine),
+                    texture(coarse),
+                    texture(places),
+                ],
+            ),
+        ];
+        Ok(Terrain {
+            clipmap,
+            land: options.land.clone(),
+            far: options.far,
+            depth: targets.depth,
+            pipeline,
+            groups,
+            view,
+            field,
+            rock,
+            held: Default::default(),
+        })
+    }
+
+    /// The baked heights.
+    pub fn clipmap(&self) -> &Clipmap {
+        &self.clipmap
+    }
+
+    /// What it keeps on the device.
+    pub fn resources(&self) -> Resources {
+        let clipmap = self.clipmap.resources();
+        Resources {
+            pipelines: clipmap.pipelines + 1,
+            bind_groups: clipmap.bind_groups + 2,
+            bindings: clipmap.bindings + 8,
+            buffers: clipmap.buffers + 3,
+            buffer_bytes: clipmap.buffer_bytes
+                + (ViewBlock::SIZE + FieldBlock::SIZE + RockBlock::SIZE) as u64,
+            ..clipmap
+        }
+    }
+
+    /// Uploads what has changed, and records the baking of the ground that the eye has uncovered. `rows` is the height of the target in pixels, from which
+    /// footprints follow.
+    ///
+    /// # Errors
+    /// As [`View::check`]; [`Error::OutOfDomain`] for lights, a number of rows that is 0, and a projection that does not fit the targets.
+    pub fn prepare(
+        &mut self,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        view: &View,
+        lights: &TerrainLights,
+        rows: u32,
+    ) -> Result<Work, Error> {
+        view.check()?;
+        let fault = |name: &str, value: String, domain: &str| {
+            Err(Error::OutOfDomain {
+                name: name.to_owned(),
+                value,
+                domain: domain.to_owned(),
+            })
+        };
+        for (name, light) in [
+            ("lights.sun", lights.sun),
+            ("lights.sky", lights.sky),
+            ("lights.bounce", lights.bounce),
+        ] {
+            if !(light.is_finite() && light.min_element() >= 0.0) {
+                return fault(name, light.to_string(), "finite and at least 0");
+            }
+        }
+        if rows == 0 {
+            return fault("rows", "0".to_owned(), "at least 1");
+        }
+        let [middle, right, up] = view.rays()?;
+        let (scale, offset) = (view.projection.z_axis.z, view.projection.w_axis.z);
+        if (offset > 0.0) != (self.depth != Depth::Normal) {
+            let value = format!("{:?}", view.projection.to_cols_array());
+            let domain = format!("one with the depth of the targets, {:?}", self.depth);
+            return fault("view.projection", value, &domain);
+        }
+        let pixel_angle = 2.0 * up.length() / rows as f32;
+        let eye = view.eye.normalized();
+        let field = *self.clipmap.field();
+        // Nothing seen is much nearer than the ground below; a level finer than a pixel there would not be used. NaN for a program's own function.
+        let clearance = eye.altitude() - f64::from(field.ground(eye, 0.0).height);
+        let nearest = if clearance.is_nan() { 0.0 } else { clearance };
+        let least = 0.35 * f64::from(pixel_angle) * nearest.max(0.0);
+        let mut work = self.clipmap.prepare(queue, encoder, eye, least);
+        let m = &self.land.material;
+        let block = ViewBlock {
+            ray_middle: middle.to_array(),
+            pixel_angle,
+            ray_right: right.to_array(),
+            far: self.far.min(self.clipmap.reach()) as f32,
+            ray_up: up.to_array(),
+            exposure: view.exposure,
+            forward: view
+                .world_from_view
+                .transform_vector3(Vec3::NEG_Z)
+                .normalize_or(Vec3::NEG_Z)
+                .to_array(),
+            depth_numerator: offset,
+            to_sun: view.sun.to_light.normalize_or(Vec3::Y).to_array(),
+            depth_offset: scale,
+            sun_light: lights.sun.to_array(),
+            sun_width: view.sun.angular_radius.tan().max(1e-4),
+            sky_light: lights.sky.to_array(),
+            snow_edge_low: m.snow_edge_low,
+            bounce_light: lights.bounce.to_array(),
+            snow_edge_high: m.snow_edge_high,
+            snow_albedo: m.snow,
+            snow_noise: m.snow_noise,
+        };
+        let wavelength = f64::from(m.rock_wavelength);
+        let [x, z] = [eye.lattice(0, wavelength)?, eye.lattice(2, wavelength)?];
+        let rock = RockBlock {
+            cell: [x.cell, 0, z.cell],
+            frac: [x.frac, 0.0, z.frac],
+            wavelength: m.rock_wavelength,
+            octaves: 5,
+            hurst: 1.0,
+            dark: m.rock_dark,
+            light: m.rock_light,
+            stain: m.rock_dark.map(|c| 0.6 * c),
+            seed: self.land.field.seed.wrapping_add(101),
+            ..Default::default()
+        };
+        let blocks = [
+            (&self.view, block.to_bytes().to_vec()),
+            (
+                &self.field,
+                field.block(field.place(eye)).to_bytes().to_vec(),
+            ),
+            (&self.rock, rock.to_bytes().to_vec()),
+        ];
+        for ((buffer, bytes), held) in blocks.into_iter().zip(&mut self.held) {
+            if bytes != *held {
+                queue.write_buffer(buffer, 0, &bytes);
+                work.writes += 1;
+                work.bytes += bytes.len() as u64;
+                *held = bytes;
+            }
+        }
+        Ok(work)
+    }
+
+    /// Draws into the host's pass.
+    pub fn draw_opaque(&self, pass: &mut wgpu::RenderPass<'_>) -> Work {
+        pass.set_pipeline(&self.pipeline);
+        for (index, group) in (0..).zip(&self.groups) {
+            pass.set_bind_group(index, group, &[]);
+        }
+        pass.draw(0..3, 0..1);
+        Work {
+            draws: 1,
+            ..Work::default()
+        }
+    }
+}

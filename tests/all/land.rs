@@ -1,0 +1,304 @@
+//! Rays over baked heights, shadows, and the ground in a host's pass.
+
+use veduta::WorldPos;
+use veduta::terrain::{Land, RayPath, TerrainRay, ray_hits};
+use veduta::view::direction;
+
+use crate::common::gpu;
+
+/// Rays of a picture of so many rows, 16:9 and 60 degrees high, from above a place.
+fn rays(
+    land: &Land,
+    rows: usize,
+    height: f64,
+    pitch: f64,
+    place: [f64; 2],
+) -> (Vec<TerrainRay>, f32) {
+    let foot = WorldPos::from_metres([place[0], 0.0, place[1]].into());
+    let ground = land
+        .field
+        .prepare::<f64>()
+        .unwrap()
+        .ground(foot, 0.0)
+        .height;
+    let origin = foot.moved_by([0.0, ground + height, 0.0].into());
+    let mut view = veduta::View::default();
+    view.look(0.3, f64::to_radians(pitch), 60_f32.to_radians(), 16.0 / 9.0);
+    let [middle, right, up] = view.rays().unwrap().map(|v| v.as_dvec3());
+    let columns = rows * 16 / 9;
+    let mut rays = Vec::new();
+    for y in 0..rows {
+        for x in 0..columns {
+            let at = |i: usize, n: usize| 2.0 * (i as f64 + 0.5) / n as f64 - 1.0;
+            let dir = (middle + right * at(x, columns) - up * at(y, rows)).normalize();
+            rays.push(TerrainRay {
+                origin,
+                dir: dir.to_array(),
+                far: 50_000.0,
+            });
+        }
+    }
+    (rays, (2.0 * up.length() / rows as f64) as f32)
+}
+
+#[test]
+fn rays_over_baked_heights_meet_the_field() {
+    let rows = 72;
+    let columns = rows * 16 / 9;
+    for (name, height, pitch) in [
+        ("thesis", 300.0, 0.0),
+        ("thesis", 2.0, 0.0),
+        ("hills", 30.0, -8.0),
+        ("lowlands", 2500.0, -15.0),
+        ("moon", 5000.0, -20.0),
+    ] {
+        let land = Land::named(name).unwrap();
+        let (rays, angle) = rays(&land, rows, height, pitch, [13_500.0, -14_700.0]);
+        let found = ray_hits(
+            gpu(),
+            veduta::programs(),
+            &land,
+            &rays,
+            angle,
+            RayPath::Fast,
+        )
+        .unwrap();
+        let field = land.field.prepare::<f64>().unwrap();
+        let top = land.field.bounds().unwrap().maximum;
+        let truth: Vec<_> = rays
+            .iter()
+            .map(|r| {
+                field
+                    .ray_hit(land.planet_radius, top, r, f64::from(angle), 0.05)
+                    .unwrap()
+            })
+            .collect();
+        // A pixel is next to the silhouette when one of its neighbours sees the other side of it.
+        let met = |i: usize| truth[i].distance.is_finite();
+        let near_edge = |i: usize| {
+            let (x, y) = (i % columns, i / columns);
+            (-1..=1_i32).any(|dy| {
+                (-1..=1_i32).any(|dx| {
+                    let (x, y) = (x as i32 + dx, y as i32 + dy);
+                    x >= 0
+                        && y >= 0
+                        && x < columns as i32
+                        && y < rows as i32
+                        && met(y as usize * columns + x as usize) != met(i)
+                })
+            })
+        };
+        let (mut wrong, mut at_edge, mut capped) = (0, 0, 0);
+        let mut errors = Vec::new();
+        for (i, (f, t)) in found.iter().zip(&truth).enumerate() {
+            capped += i32::from(f.capped);
+            match (f.distance.is_finite(), t.distance.is_finite()) {
+                (true, true) => {
+                    // Across the ray: how far it stays above the field where it should not have ended, or how deep it dips where it should have.
+                    let (near, far) = (f.distance.min(t.distance), f.distance.max(t.distance));
+                    let eye = field.place(rays[i].origin);
+                    let radius = land.planet_radius + rays[i].origin.altitude();
+                    let gap = |at: f64| {
+                        let [x, y, z] = rays[i].dir.map(|c| c * at);
+                        let altitude =
+                            (x * x + (y + radius).powi(2) + z * z).sqrt() - land.planet_radius;
+                        let g = field.ground_from(eye, [x, z], f64::from(angle) * at);
+                        (altitude - g.height) * g.normal()[1]
+                    };
+                    let across = if f.distance < t.distance {
+                        gap(near)
+                    } else {
+                        (0..=64)
+                            .map(|k| -gap(near + (far - near) * f64::from(k) / 64.0))
+                            .fold(0.0, f64::max)
+                    };
+                    errors.push(across.abs() / (f64::from(angle) * t.distance).max(0.05));
+                }
+                (false, false) => {}
+                _ if near_edge(i) => at_edge += 1,
+                _ => wrong += 1,
+            }
+        }
+        errors.sort_by(f64::total_cmp);
+        let centile = |share: f64| errors[((errors.len() - 1) as f64 * share) as usize];
+        let count = rays.len() as f64;
+        println!(
+            "{name}, {height} m: {} hits of {count}; wrong {:.3} %, at the silhouette {:.3} %, capped {capped}; error in footprints: median {:.3}, 95 % {:.3}, 99 % {:.3}",
+            errors.len(),
+            100.0 * f64::from(wrong) / count,
+            100.0 * f64::from(at_edge) / count,
+            centile(0.5),
+            centile(0.95),
+            centile(0.99)
+        );
+        assert!(f64::from(wrong) <= 2e-4 * count, "{name}: {wrong}");
+        assert!(f64::from(at_edge) <= 3e-3 * count, "{name}: {at_edge}");
+        assert!(centile(0.99) <= 0.5, "{name}");
+        assert_eq!(capped, 0, "{name}");
+    }
+}
+
+#[test]
+fn the_sun_shines_where_the_ground_lets_it() {
+    // A frame without sky light: black is shadow. Judged against the share of the sun's disc that rays of the reference reach.
+    use veduta::glam::Vec3;
+    use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
+    let land = Land::named("thesis").unwrap();
+    let rows = 36;
+    let columns = rows * 16 / 9;
+    let (rays, angle) = rays(&land, rows, 600.0, -10.0, [13_500.0, -14_700.0]);
+    let field = land.field.prepare::<f64>().unwrap();
+    let top = land.field.bounds().unwrap().maximum;
+    let gpu = gpu();
+    let targets = veduta::Targets {
+        color_format: wgpu::TextureFormat::Rgba32Float,
+        depth_format: Some(wgpu::TextureFormat::Depth32Float),
+        ..Default::default()
+    };
+    let options = TerrainOptions {
+        land: land.clone(),
+        far: 50_000.0,
+        ..Default::default()
+    };
+    let mut terrain = Terrain::new(&gpu.device, veduta::programs(), &targets, &options).unwrap();
+    let to_sun = direction(0.35, 1.9);
+    let mut view = veduta::View {
+        eye: rays[0].origin,
+        sun: veduta::Light {
+            to_light: to_sun.as_vec3(),
+            ..Default::default()
+        },
+        ..Default::default()
+    };
+    view.look(0.3, f64::to_radians(-10.0), 60_f32.to_radians(), 16.0 / 9.0);
+    let lights = TerrainLights {
+        sun: Vec3::splat(std::f32::consts::PI),
+        sky: Vec3::ZERO,
+        bounce: Vec3::ZERO,
+    };
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let work = terrain
+        .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+        .unwrap();
+    assert!(work.bakes > 0);
+    gpu.queue.submit([encoder.finish()]);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let again = terrain
+        .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+        .unwrap();
+    assert_eq!(again, Default::default(), "nothing is done twice");
+    let size = wgpu::Extent3d {
+        width: columns as u32,
+        height: rows as u32,
+        depth_or_array_layers: 1,
+    };
+    let [color, depth] = [
+        wgpu::TextureFormat::Rgba32Float,
+        wgpu::TextureFormat::Depth32Float,
+    ]
+    .map(|format| {
+        gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size,
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        })
+    });
+    let [color_view, depth_view] = [&color, &depth].map(|t| t.create_view(&Default::default()));
+    {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &color_view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: Default::default(),
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &depth_view,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        let _ = terrain.draw_opaque(&mut pass);
+    }
+    gpu.queue.submit([encoder.finish()]);
+    let floats = |texture: &wgpu::Texture| -> Vec<f32> {
+        gpu.read_texture(texture)
+            .unwrap()
+            .chunks_exact(4)
+            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            .collect()
+    };
+    let (picture, depths) = (floats(&color), floats(&depth));
+    assert!(picture.iter().all(|v| v.is_finite()));
+    let near = |row: usize| depths[row * columns + columns / 2];
+    assert!(
+        near(0) == 0.0 || near(0) < near(rows - 1),
+        "the ground below is nearer"
+    );
+    let forward = view
+        .world_from_view
+        .transform_vector3(Vec3::NEG_Z)
+        .as_dvec3();
+    let (mut wrong, mut judged, mut lit, mut dark, mut deep) = (0, 0, 0, 0, 0);
+    for (i, ray) in rays.iter().enumerate() {
+        let hit = field
+            .ray_hit(land.planet_radius, top, ray, f64::from(angle), 0.05)
+            .unwrap();
+        if !hit.distance.is_finite() || hit.distance > 8000.0 {
+            continue;
+        }
+        let toward = (0..3)
+            .map(|k| hit.normal[k] * to_sun.to_array()[k])
+            .sum::<f64>();
+        if toward < 0.25 {
+            continue;
+        }
+        let footprint = f64::from(angle) * hit.distance;
+        let start: [f64; 3] =
+            std::array::from_fn(|k| ray.dir[k] * hit.distance + hit.normal[k] * footprint);
+        let from = TerrainRay {
+            origin: ray.origin.moved_by(start.into()),
+            dir: to_sun.to_array(),
+            far: 30_000.0,
+        };
+        // Towards both ends of the disc: where they differ there is penumbra, which is not judged.
+        let seen = |turn: f64| {
+            let dir = direction(0.35 + turn, 1.9).to_array();
+            let ray = TerrainRay { dir, ..from };
+            !field
+                .ray_hit(land.planet_radius, top, &ray, 0.004, footprint.max(1.0))
+                .unwrap()
+                .distance
+                .is_finite()
+        };
+        let (up, down) = (seen(0.04), seen(-0.04));
+        if up != down {
+            continue;
+        }
+        judged += 1;
+        lit += i32::from(up);
+        dark += i32::from(!up);
+        // Reversed infinite depth is the near plane over the distance ahead.
+        let ahead = hit.distance * forward.dot(ray.dir.into());
+        let off = (0.1 / f64::from(depths[i]) / ahead - 1.0).abs();
+        deep += i32::from(off > 0.02);
+        let bright = picture[4 * i] > 0.02;
+        wrong += i32::from(bright != up);
+    }
+    println!(
+        "{wrong} of {judged} wrong, {lit} lit and {dark} dark; {deep} depths off by more than 2 %"
+    );
+    assert!(f64::from(deep) <= 0.03 * f64::from(judged));
+    assert!(lit > 100 && dark > 20);
+    // Measured: 5.2 %, from steps that pass thin crests and from the lift at the start.
+    assert!(f64::from(wrong) <= 0.06 * f64::from(judged));
+}

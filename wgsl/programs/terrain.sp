@@ -1,0 +1,148 @@
+The ground of a height field in a host's pass, with its depth: rays over baked heights, a last step on the field, three lights, rock and snow.
+
+#PROGRAM{ terrain }#
+
+#DEFINE{
+    #VARYING{
+struct Corner {
+    @builtin(position) position: vec4<f32>,
+    // The ray through the pixel, at the depth 1.
+    @location(0) ray: vec3<f32>,
+}
+
+struct TerrainView {
+    ray_middle: vec3<f32>,
+    // Angle of a pixel.
+    pixel_angle: f32,
+    ray_right: vec3<f32>,
+    // Rays end here [m].
+    far: f32,
+    ray_up: vec3<f32>,
+    exposure: f32,
+    forward: vec3<f32>,
+    // Depth is depth_numerator / linear depth - depth_offset.
+    depth_numerator: f32,
+    to_sun: vec3<f32>,
+    depth_offset: f32,
+    sun_light: vec3<f32>,
+    // Tangent of the sun's angular radius.
+    sun_width: f32,
+    sky_light: vec3<f32>,
+    snow_edge_low: f32,
+    bounce_light: vec3<f32>,
+    snow_edge_high: f32,
+    snow_albedo: vec3<f32>,
+    snow_noise: f32,
+}
+
+@group(0) @binding(0) var<uniform> draw_view: TerrainView;
+    }#
+}#
+
+#VERTEX{
+    #USE{ VARYING }#
+    #CODE{
+@vertex
+fn cover(@builtin(vertex_index) index: u32) -> Corner {
+    let clip = vec2<f32>(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u));
+    let ray = draw_view.ray_middle + clip.x * draw_view.ray_right + clip.y * draw_view.ray_up;
+    return Corner(vec4<f32>(clip, 0.5, 1.0), ray);
+}
+    }#
+}#
+
+#FRAGMENT{
+    #CODE{
+#import veduta::planet::shell::{altitude_of}
+#import veduta::terrain::clipmap::{Clip, clip_hit, clip_shadow, baked_height}
+#import veduta::terrain::field::{Field}
+#import veduta::terrain::refine::{refined_hit}
+#import veduta::terrain::material::{Rock, faded_noise, rock_low_faded, rock_high_faded, snow_blend}
+#import veduta::terrain::shading::{ThreeLights, shade_rough}
+#import veduta::tone_map::exponential::{exponential}
+#import veduta::post::srgb::{encode_srgb, decode_srgb}
+#import veduta::post::dither::{dither}
+    }#
+    #USE{ VARYING }#
+    #CODE{
+@group(0) @binding(1) var<uniform> field: Field;
+@group(0) @binding(2) var<uniform> clip: Clip;
+@group(0) @binding(3) var<uniform> rock: Rock;
+@group(1) @binding(0) var heights: texture_2d_array<f32>;
+@group(1) @binding(1) var fine: texture_2d_array<f32>;
+@group(1) @binding(2) var coarse: texture_2d_array<f32>;
+@group(1) @binding(3) var places: texture_2d<f32>;
+
+override FIELD_KIND: i32 = 2;
+override OUTPUT: i32 = 0;
+override MAX_MARCHING_STEPS: i32 = 200;
+override MAX_MARCHING_STEPS_SHADOW: i32 = 60;
+// Steps from the baked ground to the field.
+override REFINE_STEPS: i32 = 2;
+// Whether the rock has one fractal instead of four.
+override ROCK_CHEAP: i32 = 0;
+
+const INVERSE_PI: f32 = 0.31830988618;
+
+struct Shown {
+    @location(0) color: vec4<f32>,
+    @builtin(frag_depth) depth: f32,
+}
+
+// What is written for a radiance.
+fn shown(radiance: vec3<f32>, pixel: vec2<f32>) -> vec4<f32> {
+    if OUTPUT == 2 {
+        return vec4<f32>(radiance, 1.0);
+    }
+    let signal = dither(encode_srgb(exponential(radiance, draw_view.exposure)), vec2<u32>(pixel), 255.0);
+    if OUTPUT == 1 {
+        return vec4<f32>(decode_srgb(signal), 1.0);
+    }
+    return vec4<f32>(signal, 1.0);
+}
+
+@fragment
+fn draw(in: Corner) -> Shown {
+    let dir = normalize(in.ray);
+    let angle = draw_view.pixel_angle;
+    let hit = clip_hit(heights, fine, coarse, places, clip, vec3<f32>(0.0), dir, 0.0, draw_view.far, MAX_MARCHING_STEPS);
+    // A ray that ran out of steps close to the ground has almost met it.
+    let capped = hit.distance < 0.0 && hit.steps == MAX_MARCHING_STEPS && hit.clearance < 0.02 * hit.reached;
+    let met = select(hit.distance, hit.reached, capped);
+    // Where nothing is met the rest takes no rounds of any loop.
+    let is_met = met >= 0.0;
+    let pixel = select(1e30, angle, is_met);
+    let found = refined_hit(field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, vec3<f32>(0.0), dir, max(met, 1e-3), pixel, 2.0 * hit.spacing, select(0, REFINE_STEPS, is_met));
+    let point = dir * found.distance;
+    let footprint = select(1e30, angle * found.distance, is_met);
+    let altitude = altitude_of(clip.ground_radius, clip.eye_altitude, point);
+    // From where the baked ground is, which may be above the field.
+    let lift = max(baked_height(heights, places, clip, point.xz, 0) - altitude, 0.0) + 0.3 * hit.spacing;
+    let facing = dot(found.normal, draw_view.to_sun) + sqrt(found.ground.lost);
+    let rounds = select(0, MAX_MARCHING_STEPS_SHADOW, is_met && facing > 0.0);
+    let light = clip_shadow(heights, places, clip, point, draw_view.to_sun, draw_view.sun_width, lift, draw_view.far, rounds);
+    let place = vec3<f32>(point.x, altitude, point.z);
+    var albedo = vec3<f32>(0.0);
+    if ROCK_CHEAP != 0 {
+        albedo = rock_low_faded(rock, place, footprint);
+    } else {
+        albedo = rock_high_faded(rock, place, footprint);
+    }
+    let border = faded_noise(rock, place, vec3<i32>(1, 1, 1), 7u, footprint);
+    // Slopes that are not resolved make the ground steeper than it looks, and the border of the snow wider.
+    let slope = found.ground.slope;
+    let lost = found.ground.lost;
+    let level = inverseSqrt(1.0 + dot(slope, slope) + lost);
+    let blur = 0.5 * level * level * sqrt(lost * (1.0 - level * level));
+    let snow = snow_blend(level, border, draw_view.snow_edge_low - blur, draw_view.snow_edge_high + blur, draw_view.snow_noise);
+    albedo = mix(albedo, draw_view.snow_albedo, snow);
+    let lights = ThreeLights(draw_view.sun_light, draw_view.sky_light, draw_view.bounce_light);
+    let radiance = INVERSE_PI * albedo * shade_rough(lights, slope, lost, draw_view.to_sun, light);
+    if !is_met {
+        discard;
+    }
+    let linear = max(dot(point, draw_view.forward), 1e-6);
+    return Shown(shown(radiance, in.position.xy), clamp(draw_view.depth_numerator / linear - draw_view.depth_offset, 0.0, 1.0));
+}
+    }#
+}#
