@@ -242,7 +242,7 @@ impl HeightField {
     /// What holds everywhere on it, by interval arithmetic from octave to octave.
     ///
     /// # Errors
-    /// As [`HeightField::check`]; [`Error::NotYet`] for a program's own function, of which nothing is known.
+    /// As [`HeightField::check`]; [`Error::OutOfDomain`] for a program's own function, of which nothing is known.
     pub fn bounds(&self) -> Result<Bounds, Error> {
         self.check()?;
         let fall = |i: u32| (-self.hurst * f64::from(i)).exp2();
@@ -299,7 +299,11 @@ impl HeightField {
                 slopes.extend(fine_slopes.iter().map(|s| s * 0.1 * lift));
             }
             Kind::Own { .. } => {
-                return Err(Error::NotYet("bounds of a program's own height".to_owned()));
+                return Err(Error::OutOfDomain {
+                    name: "height_field".to_owned(),
+                    value: "a program's own height".to_owned(),
+                    domain: "a kind whose bounds are known".to_owned(),
+                });
             }
         }
         let steepness = self.amplitude / self.lattice_wavelength();
