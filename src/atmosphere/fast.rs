@@ -7,8 +7,11 @@ use crate::program::ProgramSet;
 
 use super::Atmosphere;
 use super::exchange::{Exchange, three};
-use super::probe::{ProbeLight, ProbeRay};
+use super::probe::{ProbeLight, ProbeRay, checked};
 use super::tables::{Eye, SkyQuality, SkyTables, bind_groups, compute};
+
+/// Rays of one dispatch.
+const MOST_RAYS: usize = 1 << 20;
 
 /// Reads the light along rays from the tables of their eyes.
 #[derive(Debug)]
@@ -57,13 +60,18 @@ impl FastProbe {
     /// of the sun share their tables.
     ///
     /// # Errors
-    /// As [`Eye::check`]; [`Error::Device`].
+    /// [`Error::OutOfDomain`] for a ray out of its domain, with its place in the list; [`Error::Device`].
     pub fn run(
         &mut self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         rays: &[ProbeRay],
     ) -> Result<Vec<ProbeLight>, Error> {
+        let rays = rays
+            .iter()
+            .enumerate()
+            .map(|(at, ray)| checked(ray, at))
+            .collect::<Result<Vec<ProbeRay>, Error>>()?;
         let mut groups: BTreeMap<(u64, u64), Vec<usize>> = BTreeMap::new();
         for (i, ray) in rays.iter().enumerate() {
             let key = (ray.altitude.to_bits(), ray.to_sun[1].to_bits());
@@ -76,7 +84,7 @@ impl FastProbe {
             };
             rays.len()
         ];
-        for members in groups.values() {
+        for members in groups.values().flat_map(|m| m.chunks(MOST_RAYS)) {
             let first = rays[members[0]];
             let flat = first.to_sun[0].hypot(first.to_sun[2]);
             let eye = Eye {

@@ -156,7 +156,7 @@ fn outside(name: &str, value: impl std::fmt::Display, domain: &str) -> Error {
 }
 
 /// The ray with unit vectors, or what is wrong with it.
-fn checked(ray: &ProbeRay, at: usize) -> Result<ProbeRay, Error> {
+pub(super) fn checked(ray: &ProbeRay, at: usize) -> Result<ProbeRay, Error> {
     let name = |field: &str| format!("rays[{at}].{field}");
     if !(0.0..=1e9).contains(&ray.altitude) {
         return Err(outside(&name("altitude"), ray.altitude, "in [0, 1e9] m"));

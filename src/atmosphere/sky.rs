@@ -1,6 +1,6 @@
 //! The sky behind a host's own scene and the air before it.
 
-use glam::{Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 
 use crate::error::Error;
 use crate::landscape::{Depth, Projection, Resources, Targets, Work};
@@ -89,6 +89,8 @@ pub struct Sky {
     draw_bytes: Vec<u8>,
     /// What linear depth in the picture's alpha is divided by.
     greatest_depth: f32,
+    /// Whether the view can show air, and the sun's disc.
+    shows: [bool; 2],
     host: Option<wgpu::BindGroup>,
 }
 
@@ -309,6 +311,7 @@ impl Sky {
             draw,
             draw_bytes: Vec::new(),
             greatest_depth: 0.0,
+            shows: [true; 2],
             host: None,
         };
         sky.pass(EyePlace::Low)?;
@@ -474,6 +477,7 @@ impl Sky {
             EyePlace::Low
         };
         self.pass(self.place)?;
+        self.shows = self.in_view(&block, &eye);
         let bytes = block.to_bytes().to_vec();
         if bytes != self.draw_bytes {
             queue.write_buffer(&self.draw, 0, &bytes);
@@ -484,7 +488,36 @@ impl Sky {
         Ok(work)
     }
 
-    /// Draws into the host's pass, or into one of its own that [`Sky::set_host`] fits.
+    /// Whether any pixel can show air or ground, and whether any can show the sun's disc; by cones about the view.
+    fn in_view(&self, block: &DrawBlock, eye: &Eye) -> [bool; 2] {
+        if self.composition != SkyComposition::Background || block.parallel != 0 {
+            return [true; 2];
+        }
+        let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
+        let [middle, right, up] = [block.ray_middle, block.ray_right, block.ray_up].map(vector);
+        // As far as a corner is from the middle, and a little more for the edge of the sun's square.
+        let reach = [right + up, right - up]
+            .into_iter()
+            .flat_map(|corner| [middle + corner, middle - corner])
+            .map(|corner| middle.angle_between(corner))
+            .fold(0.0, f64::max)
+            + 0.01;
+        let air = self.tables.atmosphere();
+        let r = air.planet_radius + eye.altitude;
+        let nadir = middle.angle_between(DVec3::NEG_Y);
+        let limb = ((air.planet_radius + air.thickness) / r).min(1.0).asin();
+        let dip = (air.planet_radius / r).min(1.0).acos();
+        let to_sun = DVec3::from_array(eye.to_sun);
+        let radius = eye.sun_angular_radius + 0.01;
+        [
+            self.place != EyePlace::Outside || nadir < reach + limb,
+            to_sun.angle_between(middle) < reach + radius
+                && to_sun.y.clamp(-1.0, 1.0).asin() > -dip - radius,
+        ]
+    }
+
+    /// Draws into the host's pass, or into one of its own that [`Sky::set_host`] fits. As `Background` it draws nothing
+    /// where the view shows neither air nor ground, and no disc where the sun is out of the view or has set.
     ///
     /// # Errors
     /// [`Error::OutOfDomain`] when the host's depth has not been set for a sky that reads it.
@@ -501,8 +534,9 @@ impl Sky {
         let Some(Pass { sky, disc }) = &self.passes[self.place as usize] else {
             return Ok(work);
         };
-        for (layer, vertices) in [(Some(sky), 3), (disc.as_ref(), 6)] {
-            let Some(layer) = layer else {
+        let layers = [(Some(sky), 3), (disc.as_ref(), 6)];
+        for ((layer, vertices), shown) in layers.into_iter().zip(self.shows) {
+            let Some(layer) = layer.filter(|_| shown) else {
                 continue;
             };
             pass.set_pipeline(&layer.pipeline);

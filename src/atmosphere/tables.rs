@@ -284,7 +284,7 @@ pub(super) fn compute(
 
 /// The tables of one atmosphere and one eye.
 ///
-/// - *Columns*: metres of every layer between a place and the sun; depends on the radius, the thickness and the profiles.
+/// - *Columns*: how much of every layer lies between a place and the sun; depends on the radius, the thickness and the profiles.
 /// - *Diffuse light*: moments of the light of all orders around a place; depends on the layers and the ground.
 /// - *Sky* and *air before things*: radiance in the directions of one eye; depend on the above, the eye's altitude, the sun's
 ///   height and its angular radius. Turning the eye, or the sun about the vertical, makes nothing anew.
@@ -333,6 +333,7 @@ struct EyeKey {
     altitude: f32,
     sun_height: f32,
     sun_angular_radius: f32,
+    scale: f32,
 }
 
 impl SkyTables {
@@ -605,6 +606,7 @@ impl SkyTables {
             altitude: block.altitude,
             sun_height: block.to_sun[1],
             sun_angular_radius: block.sun_angular_radius,
+            scale: block.scale,
         };
         if air_anew {
             self.eye_of = None;
@@ -813,17 +815,19 @@ fn table_scale(atmosphere: &Atmosphere, altitude: f64, sun_mu: f64) -> f32 {
                 continue;
             }
             let slant = 1.0 / (there_mu - horizon + 0.03);
-            let (mut scattered, mut depth) = (0.0, 0.0);
-            for lane in &lanes {
-                let density = lane.profile.density(h);
-                let depth_scale = match lane.profile {
-                    super::Profile::Exponential { scale_height } => scale_height,
-                    _ => 0.1 * top,
-                };
-                scattered += lane.scattering[1] * density * depth_scale;
-                depth += lane.extinction[1] * density * depth_scale * slant;
+            for channel in 0..3 {
+                let (mut scattered, mut depth) = (0.0, 0.0);
+                for lane in &lanes {
+                    let density = lane.profile.density(h);
+                    let depth_scale = match lane.profile {
+                        super::Profile::Exponential { scale_height } => scale_height,
+                        _ => 0.1 * top,
+                    };
+                    scattered += lane.scattering[channel] * density * depth_scale;
+                    depth += lane.extinction[channel] * density * depth_scale * slant;
+                }
+                brightest = brightest.max(scattered * (-depth).exp());
             }
-            brightest = brightest.max(scattered * (-depth).exp());
         }
     }
     let exponent = -brightest.max(1e-9).log2().round().clamp(-40.0, 4.0);

@@ -785,7 +785,7 @@ pub fn encode_dusk(light: [f64; 3]) -> [f64; 3] {
 
 /// The light of a code.
 pub fn decode_dusk(code: [f64; 3]) -> [f64; 3] {
-    code.map(|c| (c.exp2() - DUSK).max(0.0))
+    code.map(|c| (c.exp2() - 1.001 * DUSK).max(0.0))
 }
 
 /// Rows of the table of the sky above the horizon.

@@ -412,7 +412,32 @@ fn air_before_things_is_that_of_the_probe_with_every_depth() {
         }
         let mut sky = sky_with(&targets, SkyComposition::Background, Preset::Medium);
         let alone = shoot(&mut sky, &view);
-        let clear_worst = worst(&shown, &alone, 1e-3, |i| i % 5 == 0);
+        // Where nothing stands the host's picture shines through the air like stars.
+        let far: Vec<usize> = (0..PIXELS)
+            .filter(|&i| i % 5 == 0 && point(i).y / point(i).length() > -0.02)
+            .collect();
+        let forward = view.world_from_view.transform_vector3(Vec3::NEG_Z);
+        let rays: Vec<ProbeRay> = far
+            .iter()
+            .map(|&i| ProbeRay {
+                altitude: 3000.0,
+                dir: if parallel {
+                    forward.as_dvec3().normalize().to_array()
+                } else {
+                    ray_of(&view, i).normalize().to_array()
+                },
+                to_sun: view.sun.to_light.as_dvec3().normalize().to_array(),
+                distance: f64::INFINITY,
+            })
+            .collect();
+        let mut clear_worst = 0.0_f32;
+        for (&i, light) in far.iter().zip(&fast(&Preset::Medium, true, &rays)) {
+            for c in 0..3 {
+                let expected = alone.pixels[i][c] + colours[4 * i + c] * light.transmittance[c];
+                clear_worst = clear_worst.max(relative(shown.pixels[i][c], expected, 1e-3));
+            }
+        }
+        assert!(far.len() > 300);
         println!(
             "{depth:?} {projection:?}: {} pixels, worst {worst_before:.5}, sky {clear_worst:.6}",
             kept.len()
@@ -439,6 +464,36 @@ fn air_before_things_is_that_of_the_probe_with_every_depth() {
             println!("  two targets {difference:.2e}");
             assert!(difference < 1e-5);
         }
+    }
+}
+
+#[test]
+fn things_below_the_ground_sphere_have_air_before_them() {
+    // A white thing 5 km away, just above the level and 0.6 degrees below it, where the ground sphere is 190 m away, or none.
+    let white = upload(FLOAT, &[1.0; 4 * PIXELS]);
+    let targets = targets(Depth::ReversedInfinite, Projection::Perspective);
+    let mut two = sky_with(&targets, SkyComposition::TwoTargets, Preset::High);
+    for altitude in [0.0, 2.0] {
+        let view = looking(altitude, [0.0, 0.0, 4.0], [30.0, 60.0]);
+        let at = depth_buffer(&[0.1 / 5e3; PIXELS]);
+        two.set_host(&gpu().device, &at, Some(&white)).unwrap();
+        let layers = shoot_all(&mut two, &view, 2);
+        let mut ends = [[f32::MAX; 3], [0.0_f32; 3]];
+        for i in (0..PIXELS).filter(|&i| ray_of(&view, i).normalize().y.abs() < 0.011) {
+            for c in 0..3 {
+                let left = layers[1].pixels[i][c];
+                ends[0][c] = ends[0][c].min(left);
+                ends[1][c] = ends[1][c].max(left);
+            }
+        }
+        println!(
+            "{altitude} m: transmittance from {:?} to {:?}",
+            ends[0], ends[1]
+        );
+        assert!((0..3).all(|c| ends[1][c] - ends[0][c] < 0.01 && ends[1][c] < 0.98));
+        let light = |y: usize| layers[0].pixels[y * SIZE[0] as usize + 48][2];
+        let (above, below) = (light(24), light(30));
+        assert!((above / below - 1.0).abs() < 0.03, "{above} {below}");
     }
 }
 
@@ -789,6 +844,36 @@ fn a_still_frame_makes_nothing_anew() {
     assert!(writes <= 3);
     let higher = looking(200.0, [70.0, -20.0, 40.0], [31.0, 40.0]);
     assert_eq!(work(&higher).0, 1, "another altitude");
+}
+
+#[test]
+fn what_the_view_does_not_show_is_not_drawn() {
+    let gpu = gpu();
+    let mut sky = background(Preset::Low);
+    let mut draws = |view: &View| {
+        let texture = texture(FLOAT, 1, wgpu::TextureUsages::RENDER_ATTACHMENT);
+        let target = view_of(&texture);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let _ = sky.prepare(&gpu.queue, &mut encoder, view).unwrap();
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations::default(),
+            })],
+            ..Default::default()
+        });
+        sky.composite(&mut pass).unwrap().draws
+    };
+    // From the ground: sun in view, behind, set.
+    assert_eq!(draws(&looking(2.0, [0.0, 20.0, 50.0], [20.0, 10.0])), 2);
+    assert_eq!(draws(&looking(2.0, [0.0, 20.0, 50.0], [20.0, 180.0])), 1);
+    assert_eq!(draws(&looking(2.0, [0.0, 0.0, 50.0], [-3.0, 0.0])), 1);
+    // From space: away from the planet with the sun behind and before, and at its limb.
+    assert_eq!(draws(&looking(2e7, [0.0, 40.0, 50.0], [20.0, 180.0])), 0);
+    assert_eq!(draws(&looking(2e7, [0.0, 40.0, 50.0], [40.0, 0.0])), 1);
+    assert_eq!(draws(&looking(2e7, [0.0, -60.0, 50.0], [40.0, 0.0])), 1);
 }
 
 #[test]
@@ -1237,7 +1322,7 @@ fn arcs_of_the_sky_are_as_smooth_as_the_reference() {
     factors.sort_by(|a, b| b.0.total_cmp(&a.0));
     let failing = factors.iter().filter(|f| f.0 > 2.0).count();
     println!("{failing} of {} arcs above 2", factors.len());
-    assert!(factors.iter().all(|f| f.0.is_finite()) && failing <= 16);
+    assert!(factors.iter().all(|f| f.0.is_finite()) && failing <= 7);
     for (factor, arc) in factors.iter().take(failing.max(4)) {
         println!("{factor:8.2}  {arc}");
     }

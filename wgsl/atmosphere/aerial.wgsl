@@ -11,6 +11,7 @@
 #import veduta::atmosphere::medium::{Air, peak_phase}
 #import veduta::atmosphere::ray::{AirLight}
 #import veduta::atmosphere::sky_view::{SkyEye, SkyPlace}
+#import veduta::atmosphere::scatter::{step_share}
 
 /// Row of the tables, in [0, 1], of a height above or below the horizon in [0, 1], when there are `rows` rows: the halves never mix.
 ///
@@ -78,6 +79,14 @@ fn aerial_slice(spacing: i32, t: f32, length: f32) -> f32 {
     return sqrt(share);
 }
 
+/// How far along a ray of the length `length` the air reaches that lies before the distance `t`: to the top of the air, and below the horizon as far as it goes, since a host's
+/// ground may lie below the ground sphere.
+///
+/// internal
+fn aerial_reached(place: SkyPlace, t: f32, length: f32) -> f32 {
+    return max(select(min(t, length), t, place.below), 0.0);
+}
+
 /// Optical depth of the air from an eye to the distance `t` from where the ray enters the air; the other arguments are those of `aerial_light`.
 ///
 /// domain  t in [0, 2e6] m lin
@@ -89,7 +98,7 @@ fn aerial_slice(spacing: i32, t: f32, length: f32) -> f32 {
 /// error   0.02 rel of reference::sky::Sky::single_scatter
 /// source  ours
 fn aerial_depth(depths: texture_2d<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace, t: f32, length: f32) -> vec3<f32> {
-    let reached = clamp(t, 0.0, length);
+    let reached = aerial_reached(place, t, length);
     let slice = aerial_slice(aerial_spacing(eye, place.below), reached, length);
     let size = vec2<f32>(textureDimensions(depths));
     let at = vec2<f32>((slice * (size.x - 1.0) + 0.5) / size.x, aerial_row(place.y, place.below, size.y));
@@ -97,19 +106,19 @@ fn aerial_depth(depths: texture_2d<f32>, linear: sampler, air: Air, eye: SkyEye,
 }
 
 /// Light and transmittance of the air from an eye to the distance `t` from where the ray enters the air, for the direction's place in the tables of the eye and the whole length
-/// of the ray. Beyond the end it is that of the end.
+/// of the ray. Beyond the end it is that of the end, and below the horizon that of air as dense as the mean before it.
 ///
 /// domain  t in [0, 2e6] m lin
 /// domain  length in [1, 2e6] m log
 /// domain  place.x in [0, 1] 1 lin
 /// domain  place.y in [0, 1] 1 lin
 /// domain  place.nu in [-1, 1] 1 lin
-/// domain  eye.scale in [1, 1e6] 1 log
+/// domain  eye.scale in [0.0625, 1.1e12] 1 log
 /// range   [0, 1e6] 1/sr
 /// error   0.02 rel of reference::sky::Sky::single_scatter
 /// source  Hillaire2020
 fn aerial_light(light: texture_2d_array<f32>, depths: texture_2d<f32>, linear: sampler, air: Air, eye: SkyEye, place: SkyPlace, t: f32, length: f32) -> AirLight {
-    let reached = clamp(t, 0.0, length);
+    let reached = aerial_reached(place, t, length);
     let slice = aerial_slice(aerial_spacing(eye, place.below), reached, length);
     let size = vec2<f32>(textureDimensions(light));
     let slices = i32(textureNumLayers(light)) / 2;
@@ -120,6 +129,10 @@ fn aerial_light(light: texture_2d_array<f32>, depths: texture_2d<f32>, linear: s
     let far_share = between - f32(near);
     let smooth_light = mix(textureSampleLevel(light, linear, at, near, 0.0).rgb, textureSampleLevel(light, linear, at, near + 1, 0.0).rgb, far_share);
     let peaked = mix(textureSampleLevel(light, linear, at, slices + near, 0.0).rgb, textureSampleLevel(light, linear, at, slices + near + 1, 0.0).rgb, far_share);
+    let depth = aerial_depth(depths, linear, air, eye, place, t, length);
+    // Beyond the ground sphere the air is as dense as the mean before it, and dims what it scatters.
+    let within = depth * (min(reached, length) / max(reached, 1e-20));
+    let dimmed = step_share(depth, exp(-depth)) / step_share(within, exp(-within));
     let share = reached / air.top;
-    return AirLight((smooth_light + peaked * peak_phase(air, place.nu)) * (share / eye.scale), exp(-aerial_depth(depths, linear, air, eye, place, t, length)));
+    return AirLight((smooth_light + peaked * peak_phase(air, place.nu)) * dimmed * (share / eye.scale), exp(-depth));
 }

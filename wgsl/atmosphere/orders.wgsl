@@ -42,9 +42,9 @@ fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
     var up = vec3<f32>(0.0);
     var level = vec3<f32>(0.0);
     var aside = vec3<f32>(0.0);
-    // The first order has more detail than the others.
+    // The first order has more detail than the others, most of all behind the planet's shadow.
     let polar_count = select(4, 5, from_sun);
-    let steps = select(6, 8, from_sun);
+    let steps = select(6, select(8, 14, sun_mu < 0.02), from_sun);
     for (var i = 0; i < 2 * polar_count; i++) {
         let below = i >= polar_count;
         let point = select(i, i - polar_count, below);

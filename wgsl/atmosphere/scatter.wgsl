@@ -93,6 +93,19 @@ fn step_share(depth: vec3<f32>, left: vec3<f32>) -> vec3<f32> {
     return select((1.0 - left) / max(depth, vec3<f32>(1e-6)), series, depth < vec3<f32>(0.1));
 }
 
+/// What the air along a ray leaves of light from space: all of it where the ray misses the air, nothing where it meets the ground.
+///
+/// domain  ray.altitude in [0, 1e5] m lin
+/// domain  ray.mu in [-1, 1] 1 lin
+/// domain  ray.length in [0, 2e6] m lin
+/// range   [0, 1] 1
+/// error   5e-3 abs of reference::air_tables::sun_depth
+/// source  elementary
+fn space_transmittance(columns: texture_2d_array<f32>, linear: sampler, air: Air, ray: AirRay) -> vec3<f32> {
+    let left = exp(-sun_depth(columns, linear, air, ray.altitude, ray.mu));
+    return select(select(left, vec3<f32>(0.0), ray.meets_ground != 0u), vec3<f32>(1.0), ray.length <= 0.0);
+}
+
 /// Light scattered into a ray and its optical depth, over its whole length. `steps` are put on every stretch between
 /// the start, the lowest point, the edges of the planet's shadow and the end.
 ///

@@ -417,7 +417,8 @@ fn encode_dusk(light: vec3<f32>) -> vec3<f32> {
 /// outside undefined
 /// source  as encode_dusk
 fn decode_dusk(code: vec3<f32>) -> vec3<f32> {
-    return max(exp2(code) - DUSK, vec3<f32>(0.0));
+    // A little more than was added, so that no light is none.
+    return max(exp2(code) - 1.001 * DUSK, vec3<f32>(0.0));
 }
 
 /// Radiance of the sky, or of the air before the ground, for a sun of irradiance 1 and without its disc, read from the table; `coded` is that of the eye.
@@ -425,7 +426,7 @@ fn decode_dusk(code: vec3<f32>) -> vec3<f32> {
 /// domain  place.x in [0, 1] 1 lin
 /// domain  place.y in [0, 1] 1 lin
 /// domain  place.nu in [-1, 1] 1 lin
-/// domain  eye.scale in [1, 1e6] 1 log
+/// domain  eye.scale in [0.0625, 1.1e12] 1 log
 /// range   [0, 1e6] 1/sr
 /// error   0.02 rel of reference::sky::Sky::single_scatter
 /// source  Hillaire2020

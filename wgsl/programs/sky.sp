@@ -88,12 +88,12 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #ifdef AERIAL
 #import veduta::atmosphere::ray::{AirLight, air_ray}
 #import veduta::atmosphere::aerial::{aerial_light}
-#import veduta::atmosphere::columns::{sun_depth}
+#import veduta::atmosphere::scatter::{space_transmittance}
 #import veduta::atmosphere::sun_disc::{sun_disc}
 #else
 #ifdef SUN_DISC
 #import veduta::atmosphere::ray::{air_ray}
-#import veduta::atmosphere::columns::{sun_depth}
+#import veduta::atmosphere::scatter::{space_transmittance}
 #import veduta::atmosphere::sun_disc::{sun_disc}
 #endif
 #endif
@@ -143,31 +143,26 @@ fn background(ray: vec3<f32>) -> vec3<f32> {
 #ifdef AERIAL
 // Radiance of the sun's disc; parallel rays have none, since all would meet it or none.
 fn disc(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
-    let place = place_of(dir);
+    let seen = select(1.0, 0.0, draw_view.parallel != 0u) * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle);
+    return seen * from_space(dir);
+}
+
+// What the air leaves of light from space.
+fn from_space(dir: vec3<f32>) -> vec3<f32> {
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
-    let seen = select(1.0, 0.0, place.below || draw_view.parallel != 0u) * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle);
-    let left = exp(-sun_depth(columns, linear, air, ray.altitude, ray.mu));
-    return seen * select(vec3<f32>(1.0), left, ray.length > 0.0);
+    return space_transmittance(columns, linear, air, ray);
 }
 #else
 #ifdef SUN_DISC
 // Radiance of the sun's disc.
 fn disc(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
-    let place = place_of(dir);
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
-    let seen = select(1.0, 0.0, place.below) * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle);
-    let left = exp(-sun_depth(columns, linear, air, ray.altitude, ray.mu));
-    return seen * select(vec3<f32>(1.0), left, ray.length > 0.0);
+    return sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle) * space_transmittance(columns, linear, air, ray);
 }
 #endif
 #endif
 
 #ifdef AERIAL
-// Whether there is no air in a direction.
-fn misses(dir: vec3<f32>) -> bool {
-    return EYE_PLACE == 2 && place_of(dir).y > 1.0;
-}
-
 // Where something stands whose depth in the host's picture is `seen`, from the eye.
 #ifdef AERIAL_ALPHA
 fn place_seen(ray_at: vec3<f32>, seen: f32) -> vec3<f32> {
@@ -190,7 +185,7 @@ fn before(ray_at: vec3<f32>, seen: f32) -> AirLight {
     let dir = relative / max(distance, 1e-20);
     let place = place_of(dir);
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
-    if ray.length <= 0.0 {
+    if ray.length <= 0.0 && ray.meets_ground == 0u {
         return AirLight(vec3<f32>(0.0), vec3<f32>(1.0));
     }
     var front = aerial_light(light, depths, linear, air, eye, place, distance - ray.from_eye, ray.length);
@@ -227,8 +222,7 @@ fn draw(in: Corner) -> Layers {
     let pixel_angle = length(dpdx(dir));
     let seen = textureLoad(depth, vec2<i32>(in.position.xy), 0);
     if seen == draw_view.far_depth {
-        let space = select(0.0, 1.0, misses(dir));
-        return Layers(vec4<f32>((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance, 1.0), vec4<f32>(vec3<f32>(space), 1.0));
+        return Layers(vec4<f32>((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance, 1.0), vec4<f32>(from_space(dir), 1.0));
     }
     let front = before(in.ray, seen);
     return Layers(vec4<f32>(front.in_scatter * draw_view.sun_irradiance, 1.0), vec4<f32>(front.transmittance, 1.0));
@@ -248,9 +242,8 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     let nothing = seen == draw_view.far_depth;
 #endif
     if nothing {
-        // Where there is no air the host's picture stays, with its stars.
-        let space = select(vec3<f32>(0.0), held.rgb, misses(dir));
-        return shown((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance + space, in.position.xy);
+        // The host's picture holds what is in space: its stars shine through the air.
+        return shown((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance + held.rgb * from_space(dir), in.position.xy);
     }
     let front = before(in.ray, seen);
     let radiance = front.in_scatter * draw_view.sun_irradiance + front.transmittance * held.rgb;

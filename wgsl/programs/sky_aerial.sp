@@ -43,6 +43,9 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     var depth = vec3<f32>(0.0);
     var left = vec3<f32>(1.0);
     var t = 0.0;
+    var first_smooth = vec3<f32>(0.0);
+    var first_peaked = vec3<f32>(0.0);
+    var first_depth = vec3<f32>(0.0);
     for (var slice = 0; slice < slices; slice++) {
         let end = aerial_distance(spacing, f32(slice) / f32(slices - 1), ray.length);
         var mean_smooth = vec3<f32>(0.0);
@@ -70,11 +73,17 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
                 left *= share;
             }
         }
-        if slice > 0 {
-            let over = 1.0 / max(end, 1e-20);
-            mean_smooth = smooth_light * over;
-            mean_peaked = peaked_light * over;
-            mean_depth = depth * over;
+        if slice == 0 {
+            first_smooth = mean_smooth;
+            first_peaked = mean_peaked;
+            first_depth = mean_depth;
+        } else {
+            // A ray from the ground into the ground has a place but no length.
+            let none = end < 1e-3;
+            let over = 1.0 / max(end, 1e-3);
+            mean_smooth = select(smooth_light * over, first_smooth, none);
+            mean_peaked = select(peaked_light * over, first_peaked, none);
+            mean_depth = select(depth * over, first_depth, none);
         }
         let factor = eye.scale * air.top;
         textureStore(light, id.xy, slice, vec4<f32>(mean_smooth * factor, 1.0));

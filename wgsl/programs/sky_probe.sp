@@ -54,7 +54,8 @@ fn probe(@builtin(global_invocation_id) id: vec3<u32>) {
         results[id.x] = ProbeLight(marched.in_scatter, marched.transmittance);
         return;
     }
-    let t = rays[id.x].distance - ray.from_eye;
+    // A ray ends on the ground.
+    let t = min(rays[id.x].distance - ray.from_eye, ray.length);
     let place = sky_place(eye, dir);
     var found = aerial_light(light, depths, linear, air, eye, place, t, ray.length);
     if t >= ray.length {

@@ -97,6 +97,10 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "single_scattering_from_tables_meets_quadrature",
     ),
     (
+        "veduta::atmosphere::scatter::space_transmittance",
+        "air_before_things_is_that_of_the_probe_with_every_depth",
+    ),
+    (
         "veduta::atmosphere::transmittance::table_transmittance",
         "transmittance_of_the_table_meets_quadrature",
     ),
