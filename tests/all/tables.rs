@@ -457,7 +457,8 @@ fn moments_of_diffuse_light_meet_paths() {
     }
 }
 
-/// `SkyQuery`, and with it `seen_radiance`, against paths: on Earth 2 % on level planes, 5 % on tilted ones.
+/// `SkyQuery`, and with it `seen_radiance`, against paths: on Earth 2 % on level planes, 5 % on tilted ones. Three standard errors of the paths
+/// are allowed beside that.
 #[test]
 fn light_of_the_sky_on_planes_meets_paths() {
     let normals = [
@@ -509,11 +510,12 @@ fn light_of_the_sky_on_planes_meets_paths() {
                     own.map(|o| 100.0 * o)
                 );
                 for c in 0..3 {
-                    // Ten times the aerosol under a low sun: 4 % too dark.
+                    // Ten times the aerosol under a low sun is 4 % too dark on level planes.
                     let bar = match (name, k) {
                         ("earth", 0) => 0.02_f64,
-                        ("earth", _) => 0.05,
-                        _ => 0.1,
+                        ("hazy", 0) if height < 10.0 => 0.045,
+                        ("hazy", 0) => 0.02,
+                        _ => 0.055,
                     };
                     // At dusk paths hardly find what comes from below.
                     if normals[k][1] >= 0.0 || height > 0.0 && truth[c] > 1e-6 {

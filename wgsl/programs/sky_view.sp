@@ -35,7 +35,9 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     let place = texel_coordinates(vec2<f32>(f32(id.x), row.x), vec2<f32>(f32(size.x), row.y));
     let dir = sky_direction(eye, place, below);
     var ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
-    var light = scatter_along(columns, moments, linear, air, ray, eye.sun_angular_radius, ALL_ORDERS != 0, SKY_STEPS);
+    // From high up the ends of a stretch are far apart.
+    let steps = select(SKY_STEPS, SKY_STEPS + SKY_STEPS / 2, sky_coded(eye));
+    var light = scatter_along(columns, moments, linear, air, ray, eye.sun_angular_radius, ALL_ORDERS != 0, steps);
     if SKY_GROUND != 0 && ray.meets_ground != 0u {
         let sun_mu = clamp(((air.ground_radius + ray.altitude) * ray.sun_mu + ray.length * ray.nu) / air.ground_radius, -1.0, 1.0);
         let sun = max(sun_mu, 0.0) * exp(-sun_depth(columns, linear, air, 0.0, sun_mu)) * sun_above_horizon(air.ground_radius, 0.0, sun_mu, eye.sun_angular_radius);
