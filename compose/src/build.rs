@@ -49,7 +49,15 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         "air_columns" | "air_diffuse" | "air_transmittance" | "sky_view" | "sky_aerial"
         | "sky_probe" | "sky_query" | "probe" => &[&[]],
         "terrain" | "terrain_heights" => return vec![BTreeSet::new()],
-        "terrain_bake" => return vec![BTreeSet::new(), BTreeSet::from(["CLIP_MAXIMA".to_owned()])],
+        "terrain_bake" => {
+            let one = |flag: &str| BTreeSet::from([flag.to_owned()]);
+            return vec![
+                BTreeSet::new(),
+                one("CLIP_MAXIMA"),
+                one("CLIP_TOPS"),
+                one("CLIP_HORIZON"),
+            ];
+        }
         "terrain_rays" => {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }

@@ -100,11 +100,18 @@ pub struct Clipmap {
     first: usize,
     bake: wgpu::ComputePipeline,
     maxima: wgpu::ComputePipeline,
+    tops: wgpu::ComputePipeline,
+    horizon: wgpu::ComputePipeline,
     rectangles: Vec<Slot>,
     all_maxima: Vec<Slot>,
     bake_target: wgpu::BindGroup,
     maxima_source: wgpu::BindGroup,
     maxima_target: wgpu::BindGroup,
+    tops_source: wgpu::BindGroup,
+    tops_target: wgpu::BindGroup,
+    horizon_groups: [wgpu::BindGroup; 3],
+    /// How high the ground reaches in each sector around the eye.
+    pub(super) skyline: wgpu::TextureView,
     /// Heights, maxima of blocks of 8, maxima of blocks of 32, places of the levels.
     pub(super) views: [wgpu::TextureView; 4],
     places: wgpu::Texture,
@@ -208,6 +215,8 @@ impl Clipmap {
         let kind = [("FIELD_KIND", f64::from(land.field.kind.number()))];
         let (bake, bake_layouts) = compute(device, programs, &[], &kind)?;
         let (maxima, maxima_layouts) = compute(device, programs, &["CLIP_MAXIMA"], &[])?;
+        let (tops, tops_layouts) = compute(device, programs, &["CLIP_TOPS"], &[])?;
+        let (horizon, horizon_layouts) = compute(device, programs, &["CLIP_HORIZON"], &[])?;
         let texture = |label, width: u32, height: u32, layers: u32, format, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
@@ -224,11 +233,11 @@ impl Clipmap {
                 view_formats: &[],
             })
         };
-        let layered = |label, side: u32| {
+        let layered = |label, side: u32, rows: u32| {
             texture(
                 label,
                 side,
-                side,
+                rows,
                 levels as u32,
                 wgpu::TextureFormat::R32Float,
                 wgpu::TextureUsages::STORAGE_BINDING,
@@ -238,9 +247,20 @@ impl Clipmap {
                 ..Default::default()
             })
         };
-        let heights = layered("veduta heights", options.texels);
-        let fine = layered("veduta maxima of 8", options.texels / 8);
-        let coarse = layered("veduta maxima of 32", options.texels / 32);
+        let [side, of_8, of_32] = [1, 8, 32].map(|n| options.texels / n);
+        let heights = layered("veduta heights", side, side);
+        let fine = layered("veduta maxima of 8", of_8, of_8);
+        // The maximum of the level stands below.
+        let coarse = layered("veduta maxima of 32", of_32, of_32 + 1);
+        let skyline = texture(
+            "veduta skyline",
+            64,
+            1,
+            1,
+            wgpu::TextureFormat::R32Float,
+            wgpu::TextureUsages::STORAGE_BINDING,
+        )
+        .create_view(&Default::default());
         let places = texture(
             "veduta levels",
             16,
@@ -266,6 +286,17 @@ impl Clipmap {
             .collect();
         // Without bounds (a program's own function) rays end at 20 km.
         let top = land.field.bounds().map_or(2e4, |b| b.maximum) as f32;
+        let places_view = places.create_view(&Default::default());
+        let clip = buffer(device, "veduta clipmap", ClipBlock::SIZE);
+        let horizon_groups = [
+            group(device, &horizon_layouts[0], &[clip.as_entire_binding()]),
+            group(
+                device,
+                &horizon_layouts[1],
+                &[view(&fine), view(&places_view)],
+            ),
+            group(device, &horizon_layouts[2], &[view(&skyline)]),
+        ];
         Ok(Clipmap {
             field,
             planet_radius: land.planet_radius,
@@ -277,20 +308,21 @@ impl Clipmap {
             first: 0,
             bake,
             maxima,
+            tops,
+            horizon,
             rectangles,
             all_maxima,
             bake_target: group(device, &bake_layouts[2], &[view(&heights)]),
             maxima_source: group(device, &maxima_layouts[1], &[view(&heights)]),
             maxima_target: group(device, &maxima_layouts[2], &[view(&fine), view(&coarse)]),
-            views: [
-                heights,
-                fine,
-                coarse,
-                places.create_view(&Default::default()),
-            ],
+            tops_source: group(device, &tops_layouts[1], &[view(&fine)]),
+            tops_target: group(device, &tops_layouts[2], &[view(&coarse)]),
+            horizon_groups,
+            skyline,
+            views: [heights, fine, coarse, places_view],
             places,
             places_bytes: Vec::new(),
-            clip: buffer(device, "veduta clipmap", ClipBlock::SIZE),
+            clip,
             clip_bytes: Vec::new(),
         })
     }
@@ -298,6 +330,11 @@ impl Clipmap {
     /// The field.
     pub fn field(&self) -> &Prepared<f32> {
         &self.field
+    }
+
+    /// No ground is above it (m).
+    pub(super) fn top(&self) -> f64 {
+        f64::from(self.top)
     }
 
     /// The uniform `Clip`.
@@ -313,18 +350,18 @@ impl Clipmap {
     /// What it keeps on the device.
     pub fn resources(&self) -> Resources {
         let side = self.texels as u64;
-        let level = 4 * (side * side + side * side / 64 + side * side / 1024);
+        let level = 4 * (side * side + side * side / 64 + side * side / 1024 + side / 32);
         let slots = (self.rectangles.len() + self.all_maxima.len()) as u32;
         Resources {
-            pipelines: 2,
-            bind_groups: slots + 3,
-            bindings: slots + 4,
+            pipelines: 4,
+            bind_groups: slots + 8,
+            bindings: slots + 10,
             buffers: slots + 1,
             buffer_bytes: (self.rectangles.len() * RectangleBlock::SIZE
                 + self.all_maxima.len() * BakeBlock::SIZE
                 + ClipBlock::SIZE) as u64,
-            textures: 4,
-            texture_bytes: level * self.levels as u64 + 256,
+            textures: 5,
+            texture_bytes: level * self.levels as u64 + 512,
             ..Default::default()
         }
     }
@@ -339,6 +376,7 @@ impl Clipmap {
         least: f64,
     ) -> Work {
         let mut work = Work::default();
+        let mut moved = false;
         let eye = eye.normalized();
         self.first = ((least / self.spacing).max(1.0).log2().floor() as usize).min(self.levels - 1);
         let mut places = Vec::with_capacity(256);
@@ -437,6 +475,7 @@ impl Clipmap {
             work.writes += 1;
             work.bytes += bytes.len() as u64;
             self.clip_bytes = bytes;
+            moved = true;
         }
         if places != self.places_bytes {
             queue.write_texture(
@@ -452,8 +491,9 @@ impl Clipmap {
             work.writes += 1;
             work.bytes += places.len() as u64;
             self.places_bytes = places;
+            moved = true;
         }
-        if jobs.is_empty() {
+        if jobs.is_empty() && !moved {
             return work;
         }
         let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -470,13 +510,27 @@ impl Clipmap {
         pass.set_bind_group(2, &self.maxima_target, &[]);
         let mut levels: Vec<usize> = jobs.iter().map(|j| j.0).collect();
         levels.dedup();
-        for level in levels {
-            pass.set_bind_group(0, &self.all_maxima[level].group, &[]);
+        for level in &levels {
+            pass.set_bind_group(0, &self.all_maxima[*level].group, &[]);
             let groups = (self.texels / BLOCK) as u32;
             pass.dispatch_workgroups(groups, groups, 1);
             work.dispatches += 1;
             work.bakes += 1;
         }
+        pass.set_pipeline(&self.tops);
+        pass.set_bind_group(1, &self.tops_source, &[]);
+        pass.set_bind_group(2, &self.tops_target, &[]);
+        for level in &levels {
+            pass.set_bind_group(0, &self.all_maxima[*level].group, &[]);
+            pass.dispatch_workgroups(1, 1, 1);
+            work.dispatches += 1;
+        }
+        pass.set_pipeline(&self.horizon);
+        for (index, group) in (0..).zip(&self.horizon_groups) {
+            pass.set_bind_group(index, group, &[]);
+        }
+        pass.dispatch_workgroups(1, 1, 1);
+        work.dispatches += 1;
         work
     }
 }

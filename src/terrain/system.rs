@@ -11,6 +11,9 @@ use crate::programs::blocks::{Field as FieldBlock, Rock as RockBlock, TerrainVie
 use crate::settings::{Preset, Settings};
 use crate::view::View;
 
+/// Tiles of the picture: 16 across and 12 down.
+const TILES: u32 = 16 * 12;
+
 /// Irradiances on the ground, in the picture's own unit. A host that has an atmosphere takes them from its `SkyQuery`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TerrainLights {
@@ -94,6 +97,8 @@ pub struct Terrain {
     field: wgpu::Buffer,
     rock: wgpu::Buffer,
     held: [Vec<u8>; 3],
+    /// Whether the view shows any ground.
+    seen: bool,
 }
 
 impl Terrain {
@@ -204,6 +209,7 @@ impl Terrain {
                     texture(fine),
                     texture(coarse),
                     texture(places),
+                    texture(&clipmap.skyline),
                 ],
             ),
         ];
@@ -218,6 +224,7 @@ impl Terrain {
             field,
             rock,
             held: Default::default(),
+            seen: true,
         })
     }
 
@@ -232,7 +239,7 @@ impl Terrain {
         Resources {
             pipelines: clipmap.pipelines + 1,
             bind_groups: clipmap.bind_groups + 2,
-            bindings: clipmap.bindings + 8,
+            bindings: clipmap.bindings + 9,
             buffers: clipmap.buffers + 3,
             buffer_bytes: clipmap.buffer_bytes
                 + (ViewBlock::SIZE + FieldBlock::SIZE + RockBlock::SIZE) as u64,
@@ -288,6 +295,11 @@ impl Terrain {
         let nearest = if clearance.is_nan() { 0.0 } else { clearance };
         let least = 0.35 * f64::from(pixel_angle) * nearest.max(0.0);
         let mut work = self.clipmap.prepare(queue, encoder, eye, least);
+        // From above all ground, rays that rise meet none; those of a picture lie between those of its corners.
+        let rises = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]
+            .iter()
+            .all(|[x, y]| (middle + *x * right + *y * up).y > 0.0);
+        self.seen = !(rises && eye.altitude() > self.clipmap.top());
         let m = &self.land.material;
         let block = ViewBlock {
             ray_middle: middle.to_array(),
@@ -346,13 +358,16 @@ impl Terrain {
         Ok(work)
     }
 
-    /// Draws into the host's pass.
+    /// Draws into the host's pass: tiles of the picture, without those above the ground. From above all ground a view that looks up draws nothing.
     pub fn draw_opaque(&self, pass: &mut wgpu::RenderPass<'_>) -> Work {
+        if !self.seen {
+            return Work::default();
+        }
         pass.set_pipeline(&self.pipeline);
         for (index, group) in (0..).zip(&self.groups) {
             pass.set_bind_group(index, group, &[]);
         }
-        pass.draw(0..3, 0..1);
+        pass.draw(0..TILES * 6, 0..1);
         Work {
             draws: 1,
             ..Work::default()

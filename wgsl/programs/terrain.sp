@@ -42,11 +42,47 @@ struct TerrainView {
 #VERTEX{
     #USE{ VARYING }#
     #CODE{
+@group(1) @binding(4) var horizon: texture_2d<f32>;
+
+const SECTORS_PER_RADIAN: f32 = 10.18591636;
+
+fn ray_through(clip: vec2<f32>) -> vec3<f32> {
+    return draw_view.ray_middle + clip.x * draw_view.ray_right + clip.y * draw_view.ray_up;
+}
+
+// Tiles of the picture, 16 across and 12 down, two triangles each; those in which all rays pass above the ground around them have no size.
 @vertex
 fn cover(@builtin(vertex_index) index: u32) -> Corner {
-    let clip = vec2<f32>(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u));
-    let ray = draw_view.ray_middle + clip.x * draw_view.ray_right + clip.y * draw_view.ray_up;
-    return Corner(vec4<f32>(clip, 0.5, 1.0), ray);
+    let tile = index / 6u;
+    let corner = index % 6u;
+    let k = select(select(3u, corner % 3u, corner == 4u), select(corner, 2u, corner == 3u), corner < 4u);
+    let size = vec2<f32>(0.125, 0.16666667);
+    let place = vec2<f32>(f32(tile % 16u), f32(tile / 16u));
+    let clip = (place + vec2<f32>(f32(k & 1u), f32(k >> 1u))) * size - 1.0;
+    let middle = ray_through((place + 0.5) * size - 1.0);
+    // Least tangent of the elevation and the azimuths of the corners: along an edge, which is a great circle, the tangent is a cosine of the azimuth.
+    var least = 1e30;
+    var left = 0.0;
+    var right = 0.0;
+    for (var j = 0; j < 4; j++) {
+        let ray = ray_through((place + vec2<f32>(f32(j & 1), f32(j >> 1u))) * size - 1.0);
+        least = min(least, ray.y / max(length(ray.xz), 1e-6));
+        let turn = atan2(middle.x * ray.z - middle.z * ray.x, dot(middle.xz, ray.xz));
+        left = min(left, turn);
+        right = max(right, turn);
+    }
+    // Tiles around the zenith see all sectors.
+    let wide = right - left > 1.2;
+    let azimuth = atan2(middle.z, middle.x);
+    let first = select(i32(floor((azimuth + left - 1e-3) * SECTORS_PER_RADIAN)), 0, wide);
+    let last = select(i32(floor((azimuth + right + 1e-3) * SECTORS_PER_RADIAN)), 63, wide);
+    var skyline = -1e30;
+    for (var j = first; j <= last; j++) {
+        skyline = max(skyline, textureLoad(horizon, vec2<i32>(j & 63, 0), 0).x);
+    }
+    let lower = least / select(max(cos(right - left), 0.3), 1.0, least > 0.0);
+    let seen = skyline >= lower - 1e-3 * (1.0 + abs(lower)) || (wide && least < 0.0);
+    return Corner(vec4<f32>(select(vec2<f32>(0.0), clip, seen), 0.5, 1.0), ray_through(clip));
 }
     }#
 }#

@@ -1,7 +1,7 @@
 //! Rays over baked heights: nested levels around the eye, each with the maxima of its blocks.
 //!
 //! Level l has texels of `spacing` 2^l metres, heights at their lower corners; it serves places whose larger coordinate is within `reach` texels of the
-//! eye, and is addressed modulo its size, so that texels stay where they are when the eye moves. A ray leaves a block of 32, of 8 or of 1 texel at a time:
+//! eye, and is addressed modulo its size, so that texels stay where they are when the eye moves. A ray first leaves whole levels that lie below it, then a block of 32, of 8 or of 1 texel at a time:
 //! the largest whose maximum lies below the ray's altitude on its way through, of which the tangent is a lower bound, since altitude over a sphere is
 //! convex. In a single texel the patch between its corners is bilinear.
 //!
@@ -95,7 +95,7 @@ fn baked_height(heights: texture_2d_array<f32>, places: texture_2d<f32>, clip: C
 }
 
 /// First place where a ray from `origin` meets the baked ground between `near` and `far`. A ray that uses up `max_steps` has no hit, but tells how
-/// far it came. Rays that rise above the highest of the heights end there.
+/// far it came. Below the maxima of blocks of 32 in `coarse` stands that of the level. Rays that rise above the highest of the heights end there.
 ///
 /// domain  origin in [-1e6, 1e6] m lin
 /// domain  dir in [-1, 1] 1 lin
@@ -105,7 +105,7 @@ fn baked_height(heights: texture_2d_array<f32>, places: texture_2d<f32>, clip: C
 /// range   [-1e6, 1e6] m
 /// error   1 abs of reference::intersect::first_crossing
 /// outside undefined
-/// source  Tevs2008; departs: clipmap, blocks of three sizes, tangents for altitudes
+/// source  Tevs2008; departs: clipmap, blocks of four sizes, tangents for altitudes
 fn clip_hit(heights: texture_2d_array<f32>, fine: texture_2d_array<f32>, coarse: texture_2d_array<f32>, places: texture_2d<f32>, clip: Clip,
     origin: vec3<f32>, dir: vec3<f32>, near: f32, far: f32, max_steps: i32) -> ClipHit {
     var hit = ClipHit(-1.0, near, 0.0, clip.spacing, 0);
@@ -118,48 +118,91 @@ fn clip_hit(heights: texture_2d_array<f32>, fine: texture_2d_array<f32>, coarse:
     let fine_mask = vec2<i32>(clip.texels / 8 - 1);
     let coarse_mask = vec2<i32>(clip.texels / 32 - 1);
     var t = near;
-    for (var i = 0; i < max_steps; i++) {
-        if t >= far {
-            break;
-        }
+    // Levels that lie below the ray as far as they serve it.
+    for (var i = 0; i < clip.levels; i++) {
         let q = t * (t + 2.0 * radius * mu);
         let root = sqrt(max(radius * radius + q, 0.0));
         let altitude = start + q / (radius + root);
         let rise = (radius * mu + t) / root;
         let at = origin.xz + dir.xz * t;
         let level = level_of(clip, at);
-        if level >= clip.levels || (rise >= 0.0 && altitude > clip.top) {
+        let spacing = textureLoad(places, vec2<i32>(level, 0), 0).w;
+        let leave = ((2.0 * side - 1.0) * clip.reach * spacing - at) * inverse + abs(inverse) * spacing * 1e-3;
+        let step = min(leave.x, leave.y);
+        if level >= clip.levels || altitude + min(rise * step, 0.0) <= textureLoad(coarse, vec2<i32>(0, clip.texels / 32), level, 0).x {
             break;
         }
-        let place = textureLoad(places, vec2<i32>(level, 0), 0);
-        let u = place.xy + at * place.z;
-        let whole = floor(u);
-        let cell = vec2<i32>(whole);
-        // Ways to the borders of the blocks of 32, 8 and 1, and a thousandth of a texel beyond.
-        let stretch = inverse * place.w;
-        let leave = abs(stretch) * 1e-3;
-        let to_coarse = ((floor(whole * 0.03125) + side) * 32.0 - u) * stretch + leave;
-        let to_fine = ((floor(whole * 0.125) + side) * 8.0 - u) * stretch + leave;
-        let to_texel = (whole + side - u) * stretch + leave;
-        let step_coarse = min(to_coarse.x, to_coarse.y);
-        let step_fine = min(to_fine.x, to_fine.y);
-        let step = min(to_texel.x, to_texel.y);
-        let over_coarse = textureLoad(coarse, (cell >> vec2<u32>(5u)) & coarse_mask, level, 0).x;
-        let over_fine = textureLoad(fine, (cell >> vec2<u32>(3u)) & fine_mask, level, 0).x;
-        let clear_coarse = altitude + min(rise * step_coarse, 0.0) > over_coarse;
-        let clear_fine = altitude + min(rise * step_fine, 0.0) > over_fine;
-        let h = corners(heights, clip, cell, level);
-        let here = altitude - patch_height(h, u - whole);
-        let there = altitude + rise * step - patch_height(h, clamp(u - whole + flat * place.z * step, vec2<f32>(0.0), vec2<f32>(1.0)));
-        hit.reached = t;
-        hit.clearance = here;
-        hit.spacing = place.w;
-        hit.steps = i + 1;
-        if !clear_coarse && !clear_fine && min(here, there) <= 0.0 {
-            hit.distance = t + step * max(here, 0.0) / max(max(here, 0.0) - there, 1e-9);
-            break;
+        t += step;
+    }
+    hit.reached = t;
+    var done = false;
+    while hit.steps < max_steps && !done {
+        // Blocks of 32 and of 8 texels, up to one of 8 that may be met.
+        var level = 0;
+        var place = vec4<f32>(0.0);
+        var end = 0.0;
+        while hit.steps < max_steps {
+            let q = t * (t + 2.0 * radius * mu);
+            let root = sqrt(max(radius * radius + q, 0.0));
+            let altitude = start + q / (radius + root);
+            let rise = (radius * mu + t) / root;
+            let at = origin.xz + dir.xz * t;
+            level = level_of(clip, at);
+            if t >= far || level >= clip.levels || (rise >= 0.0 && altitude > clip.top) {
+                done = true;
+                break;
+            }
+            hit.steps += 1;
+            place = textureLoad(places, vec2<i32>(level, 0), 0);
+            let u = place.xy + at * place.z;
+            let cell = vec2<i32>(floor(u));
+            // Ways to the borders of the blocks, and a thousandth of a texel beyond.
+            let stretch = inverse * place.w;
+            let leave = abs(stretch) * 1e-3;
+            let to_coarse = ((floor(u * 0.03125) + side) * 32.0 - u) * stretch + leave;
+            let to_fine = ((floor(u * 0.125) + side) * 8.0 - u) * stretch + leave;
+            let step_coarse = min(to_coarse.x, to_coarse.y);
+            let step_fine = min(to_fine.x, to_fine.y);
+            let over_coarse = textureLoad(coarse, (cell >> vec2<u32>(5u)) & coarse_mask, level, 0).x;
+            let over_fine = textureLoad(fine, (cell >> vec2<u32>(3u)) & fine_mask, level, 0).x;
+            let clear_coarse = altitude + min(rise * step_coarse, 0.0) > over_coarse;
+            if !clear_coarse && altitude + min(rise * step_fine, 0.0) <= over_fine {
+                end = t + step_fine;
+                break;
+            }
+            hit.reached = t;
+            hit.clearance = altitude - over_fine;
+            t += select(step_fine, step_coarse, clear_coarse);
         }
-        t += select(select(step, step_fine, clear_fine), step_coarse, clear_coarse);
+        // Its texels, while its level serves them.
+        while hit.steps < max_steps && !done && t < end {
+            let q = t * (t + 2.0 * radius * mu);
+            let root = sqrt(max(radius * radius + q, 0.0));
+            let altitude = start + q / (radius + root);
+            let rise = (radius * mu + t) / root;
+            let at = origin.xz + dir.xz * t;
+            if level_of(clip, at) != level {
+                break;
+            }
+            let u = place.xy + at * place.z;
+            let whole = floor(u);
+            let stretch = inverse * place.w;
+            let to_texel = (whole + side - u) * stretch + abs(stretch) * 1e-3;
+            let step = min(to_texel.x, to_texel.y);
+            let h = corners(heights, clip, vec2<i32>(whole), level);
+            let here = altitude - patch_height(h, u - whole);
+            let there = altitude + rise * step - patch_height(h, clamp(u - whole + flat * place.z * step, vec2<f32>(0.0), vec2<f32>(1.0)));
+            hit.reached = t;
+            hit.clearance = here;
+            hit.spacing = place.w;
+            hit.steps += 1;
+            if min(here, there) <= 0.0 {
+                hit.distance = t + step * max(here, 0.0) / max(max(here, 0.0) - there, 1e-9);
+                done = true;
+                break;
+            }
+            t += step;
+        }
     }
     return hit;
 }
