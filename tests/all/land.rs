@@ -42,6 +42,7 @@ fn rays(
     (rays, (2.0 * up.length() / rows as f64) as f32)
 }
 
+/// Judges `clip_hit`.
 #[test]
 fn rays_over_baked_heights_meet_the_field() {
     // Craters cost the reference ten times as much as noise.
@@ -253,6 +254,7 @@ fn sky_is_not_drawn_and_no_ground_is_lost_with_it() {
     assert_eq!(draw(above, 0.0).1, 1);
 }
 
+/// Judges `clip_shadow`.
 #[test]
 fn the_sun_shines_where_the_ground_lets_it() {
     // A frame without sky light: black is shadow. Judged against the share of the sun's disc that rays of the reference reach.

@@ -412,7 +412,7 @@ fn air_before_things_is_that_of_the_probe_with_every_depth() {
         }
         let mut sky = sky_with(&targets, SkyComposition::Background, Preset::Medium);
         let alone = shoot(&mut sky, &view);
-        // Where nothing stands the host's picture shines through the air like stars.
+        // Where nothing stands the host's picture shines through the air like stars (`space_transmittance`).
         let far: Vec<usize> = (0..PIXELS)
             .filter(|&i| i % 5 == 0 && point(i).y / point(i).length() > -0.02)
             .collect();
@@ -1328,7 +1328,7 @@ fn arcs_of_the_sky_are_as_smooth_as_the_reference() {
     }
 }
 
-/// Pictures of the tables of `Sky`, which show the ground and share reads between pixels, against rays read from tables of the finest quality.
+/// Pictures of the tables of `Sky`, which show the ground and share reads between pixels (`sky_seen_by_pair`, and `sky_seen` where nothing is shared), against rays read from tables of the finest quality.
 #[test]
 fn what_the_sky_draws_is_what_the_probe_finds() {
     let gpu = gpu();

@@ -941,7 +941,7 @@ fn transmittance_of_the_table_meets_quadrature() {
             .chunks_exact(2)
             .map(|b| half(u16::from_le_bytes([b[0], b[1]])))
             .collect();
-        // Read as a linear sampler that clamps does.
+        // Read as `table_transmittance` reads with a linear sampler that clamps.
         let read = |h: f64, mu: f64, c: usize| {
             let at = air_tables::transmittance_coordinates(air.planet_radius, air.thickness, h, mu);
             let at = [0, 1].map(|k| at[k] * f64::from(size[k] - 1));

@@ -191,8 +191,17 @@ fn outward_columns(air: Air, h: f32, mu: f32, far: f32) -> Lanes {
     return sum;
 }
 
-/// Columns of all lanes [m] from altitude `h` along zenith cosine `mu` to the top of the air, outwards from the lowest point; below the horizon those
-/// along the horizon.
+/// Columns of all lanes [m] to the top of the air, outwards from the lowest point of the path; those of lanes that are not used are its length.
+///
+/// internal
+fn every_column(air: Air, h: f32, seen: f32) -> Lanes {
+    let path = path_to_top(air.ground_radius, air.top, h, seen);
+    let before = outward_columns(air, path.lowest, 0.0, path.falls);
+    let beyond = outward_columns(air, path.lowest, max(seen, 0.0), path.rises);
+    return with_ramps(air, h, path, Lanes(before.low + beyond.low, before.high + beyond.high));
+}
+
+/// Columns of all lanes [m] from altitude `h` along zenith cosine `mu` to the top of the air; below the horizon those along the horizon.
 ///
 /// domain  h in [0, air.top] m lin
 /// domain  mu in [-1, 1] 1 lin
@@ -201,11 +210,10 @@ fn outward_columns(air: Air, h: f32, mu: f32, far: f32) -> Lanes {
 /// outside undefined
 /// source  veduta::math::squared for exponential layers; between the bends of others Simpson's rule
 fn columns_to_top(air: Air, h: f32, mu: f32) -> Lanes {
-    let seen = max(mu, horizon_cosine(air.ground_radius, h));
-    let path = path_to_top(air.ground_radius, air.top, h, seen);
-    let before = outward_columns(air, path.lowest, 0.0, path.falls);
-    let beyond = outward_columns(air, path.lowest, max(seen, 0.0), path.rises);
-    return with_ramps(air, h, path, Lanes(before.low + beyond.low, before.high + beyond.high));
+    let columns = every_column(air, h, max(mu, horizon_cosine(air.ground_radius, h)));
+    let used = vec4<u32>(air.lane_count);
+    let none = vec4<f32>(0.0);
+    return Lanes(select(none, columns.low, vec4<u32>(0u, 1u, 2u, 3u) < used), select(none, columns.high, vec4<u32>(4u, 5u, 6u, 7u) < used));
 }
 
 /// The texel layers of the table for altitude `h` and zenith cosine `mu`.
@@ -219,7 +227,7 @@ fn columns_to_top(air: Air, h: f32, mu: f32) -> Lanes {
 fn column_code(air: Air, h: f32, mu: f32) -> Lanes {
     let seen = max(mu, horizon_cosine(air.ground_radius, h));
     let path = path_to_top(air.ground_radius, air.top, h, seen);
-    let columns = columns_to_top(air, h, seen);
+    let columns = every_column(air, h, seen);
     let scale = column_scale(air, h, seen);
     let long = path.rises + path.falls;
     let floor = vec4<f32>(1e-30);

@@ -179,6 +179,11 @@ fn sky_place_shown(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
 /// domain  look.above_rise in [0, 1] 1 lin
 /// domain  look.below in [0, 1] 1 lin
 /// domain  look.below_rise in [0, 1] 1 lin
+/// domain  look.gain in [1e-12, 16] 1 log
+/// domain  look.peak_base in [1, 2] 1 lin
+/// domain  look.peak_slope in [0, 2] 1 lin
+/// domain  look.peak_level in [0, 1] 1/sr lin
+/// domain  look.peak_square in [0, 1] 1/sr lin
 /// domain  ray in [-1e3, 1e3] 1 lin
 /// range   [-2, 2] 1
 /// error   1e-3 abs of reference::air_tables::sky_texel

@@ -112,10 +112,12 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 @group(1) @binding(3) var depths: texture_2d<f32>;
 @group(1) @binding(4) var columns: texture_2d_array<f32>;
 #ifdef AERIAL
+#ifdef AERIAL_TARGETS
+@group(2) @binding(0) var depth: texture_depth_2d;
+#else
 #ifndef AERIAL_ALPHA
 @group(2) @binding(0) var depth: texture_depth_2d;
 #endif
-#ifndef AERIAL_TARGETS
 @group(2) @binding(1) var picture: texture_2d<f32>;
 #endif
 #endif

@@ -2023,6 +2023,9 @@ fn particular(entry: Entry) -> Entry {
             .weight(500.0),
         ("terrain::shading", "bounce_direction") => entry.unit("to_sun").branch("to_sun", &[1e-5]),
         ("terrain::shading", _) => entry.unit("normal").unit("to_sun"),
+        ("terrain::material", "faded_noise") => entry.rock().weight(10.0),
+        ("terrain::material", "rock_low_faded") => entry.rock().weight(20.0),
+        ("terrain::material", "rock_high_faded") => entry.rock().weight(80.0),
         ("terrain::material", "rock_low") => entry.rock().weight(10.0),
         ("terrain::material", "rock_high") => entry.rock().weight(40.0),
         ("terrain::material", "rock_low_filtered") => {
