@@ -480,10 +480,10 @@ fn things_below_the_ground_sphere_have_air_before_them() {
         let layers = shoot_all(&mut two, &view, 2);
         let mut ends = [[f32::MAX; 3], [0.0_f32; 3]];
         for i in (0..PIXELS).filter(|&i| ray_of(&view, i).normalize().y.abs() < 0.011) {
-            for c in 0..3 {
-                let left = layers[1].pixels[i][c];
-                ends[0][c] = ends[0][c].min(left);
-                ends[1][c] = ends[1][c].max(left);
+            let [least, most] = &mut ends;
+            for ((least, most), left) in least.iter_mut().zip(most).zip(layers[1].pixels[i]) {
+                *least = least.min(left);
+                *most = most.max(left);
             }
         }
         println!(
