@@ -12,6 +12,7 @@ pub mod device;
 pub mod error;
 #[cfg(feature = "compose")]
 pub mod eval;
+mod exchange;
 pub mod landscape;
 pub mod program;
 #[cfg(feature = "reference")]

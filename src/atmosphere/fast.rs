@@ -6,9 +6,9 @@ use crate::error::Error;
 use crate::program::ProgramSet;
 
 use super::Atmosphere;
-use super::exchange::{Exchange, three};
 use super::probe::{ProbeLight, ProbeRay, checked};
 use super::tables::{Eye, SkyQuality, SkyTables, bind_groups, compute};
+use crate::exchange::{Exchange, three};
 
 /// Rays of one dispatch.
 const MOST_RAYS: usize = 1 << 20;

@@ -1,7 +1,6 @@
 //! The air of a planet: what it is made of, the sky that it makes, and the air before a host's own scene.
 
 mod check;
-mod exchange;
 mod fast;
 mod file;
 mod medium;

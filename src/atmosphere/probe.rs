@@ -1,13 +1,13 @@
 //! Radiance and transmittance along given rays: a query, not a part of a frame.
 
 use super::check::{fault, within};
-use super::exchange::{Exchange, three};
 use super::fast::FastProbe;
 use super::medium::Atmosphere;
 use super::ray::AirRay;
 use super::tables::SkyQuality;
 use crate::device::Gpu;
 use crate::error::Error;
+use crate::exchange::{Exchange, three};
 use crate::program::{PipelineOptions, ProgramSet};
 
 /// A ray whose light is asked for.

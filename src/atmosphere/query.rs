@@ -4,8 +4,8 @@ use crate::error::Error;
 use crate::program::ProgramSet;
 
 use super::Atmosphere;
-use super::exchange::{Exchange, three};
 use super::tables::{SkyTables, bind_groups, compute};
+use crate::exchange::{Exchange, three};
 
 /// A plane in the air whose light is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]

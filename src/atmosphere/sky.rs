@@ -396,7 +396,7 @@ impl Sky {
 
     /// As [`Sky::set_host`] for `OverPictureWithAlpha`: a picture of scene radiance whose alpha is the depth along the view's direction over
     /// `greatest_depth` in metres, in [1, 1e12]; where it is 1 or more there is sky. A 32-bit format keeps millimetres near the eye; `Rgba16Float` a
-    /// thousandth of the depth.
+    /// thousandth of the depth. Before [`Sky::prepare`], which uploads the depth.
     ///
     /// # Errors
     /// [`Error::OutOfDomain`] for a sky of another composition and for a depth out of its domain.

@@ -1,8 +1,9 @@
 //! The tables of an atmosphere and of one eye in it: made on the device, and made anew only when what they depend on has changed.
 
 use crate::error::Error;
+use crate::exchange;
 use crate::landscape::{Resources, Work};
-use crate::program::{Pipeline, PipelineOptions, ProgramSet, ReadyPipeline};
+use crate::program::ProgramSet;
 use crate::programs::blocks::{SkyEye as EyeBlock, SkyLook as LookBlock};
 use crate::settings::Settings;
 
@@ -256,7 +257,7 @@ pub(super) fn bind_groups(
         .collect()
 }
 
-/// The pipeline of a compute program with its layouts.
+/// The pipeline of a compute program for an atmosphere, with its layouts.
 pub(super) fn compute(
     device: &wgpu::Device,
     programs: &ProgramSet,
@@ -264,22 +265,7 @@ pub(super) fn compute(
     name: &str,
     constants: &[(&str, f64)],
 ) -> Result<(wgpu::ComputePipeline, Vec<wgpu::BindGroupLayout>), Error> {
-    let ReadyPipeline {
-        pipeline,
-        bind_group_layouts,
-    } = programs.get(name, atmosphere.features())?.pipeline(
-        device,
-        &PipelineOptions {
-            constants,
-            ..Default::default()
-        },
-    )?;
-    match pipeline {
-        Pipeline::Compute(pipeline) => Ok((pipeline, bind_group_layouts)),
-        Pipeline::Render(_) => Err(Error::MissingStage {
-            program: name.to_owned(),
-        }),
-    }
+    exchange::compute(device, programs, name, atmosphere.features(), constants)
 }
 
 /// The tables of one atmosphere and one eye.

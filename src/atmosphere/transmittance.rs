@@ -8,7 +8,7 @@ use super::Atmosphere;
 use super::tables::{Bake, Table, bind_groups, compute, upload};
 
 /// Transmittance from every altitude towards the sun, for shaders that ask at many places; read with `table_transmittance` of
-/// `veduta::atmosphere::transmittance`. The tables of the sky do without it: columns are as exact at a quarter of the texels, and hold for any coefficients.
+/// `veduta::atmosphere::transmittance`. The tables of the sky do without it: columns are as exact with half the texels, and hold for any coefficients.
 ///
 /// `Rgba16Float`; a texel holds the roots of red, green and blue. Needs a linear sampler that clamps.
 #[derive(Debug)]
@@ -24,7 +24,7 @@ pub struct TransmittanceTable {
 
 impl TransmittanceTable {
     /// Makes texture and pipeline for airs with as many lobes as this one: at most four, or more. `size` is zenith angles by altitudes, each in
-    /// `[2, 1024]`; 128 x 64 is right to 0.005 for 99 of 100 paths.
+    /// `[2, 1024]`; 128 x 64 is right to 0.0025 for 99 of 100 paths.
     ///
     /// # Errors
     /// [`Error::OutOfDomain`] for a size out of its domain; the faults of [`Atmosphere::check`], [`ProgramSet::get`] and of making pipelines.

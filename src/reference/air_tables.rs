@@ -3,6 +3,7 @@
 use super::air_ray;
 use super::math::{dot, mix, one_minus_exp_over_x, scale};
 use super::medium::{air_phases, air_scattering, peak_phase};
+use super::monte_carlo::Measured;
 use super::parallel::parallel_map;
 use super::planet::top_distance;
 use super::quadrature::squared_node;
@@ -311,22 +312,20 @@ pub fn further_orders(before: Moments, last: Moments) -> Moments {
     }
 }
 
-/// Moments of the light of all orders around a place, and the standard error of its integral, by paths in so many directions
-/// drawn evenly.
-pub fn diffuse_moments(
+/// Light of all orders by paths from evenly drawn directions; the sun stands over +x.
+fn light_around(
     sky: &Sky,
     h: f64,
     sun_mu: f64,
     directions: usize,
     seed: u64,
-) -> (Moments, [f64; 3]) {
-    let sun_sine = (1.0 - sun_mu * sun_mu).max(1e-3).sqrt();
+) -> Vec<([f64; 3], Measured)> {
     let paths = Paths {
         samples: 2,
         seed,
         ..Default::default()
     };
-    let rays = parallel_map(directions, |i| {
+    parallel_map(directions, |i| {
         // Points of a sequence that fills the square.
         let [u, v] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3]
             .map(|step: f64| (0.5 + step * (i + 1) as f64).fract());
@@ -338,8 +337,21 @@ pub fn diffuse_moments(
             to_sun: [(1.0 - sun_mu * sun_mu).max(0.0).sqrt(), sun_mu, 0.0],
             distance: f64::INFINITY,
         };
-        (mu, sine, phi, trace_sky(sky, &ray, &paths, i as u64).mean)
-    });
+        (ray.dir, trace_sky(sky, &ray, &paths, i as u64))
+    })
+}
+
+/// Moments of the light of all orders around a place, and the standard error of its integral, by paths in so many directions
+/// drawn evenly.
+pub fn diffuse_moments(
+    sky: &Sky,
+    h: f64,
+    sun_mu: f64,
+    directions: usize,
+    seed: u64,
+) -> (Moments, [f64; 3]) {
+    let sun_sine = (1.0 - sun_mu * sun_mu).max(1e-3).sqrt();
+    let rays = light_around(sky, h, sun_mu, directions, seed);
     let mut moments = Moments {
         whole: [0.0; 3],
         up: [0.0; 3],
@@ -348,11 +360,11 @@ pub fn diffuse_moments(
     };
     let mut squares = [0.0; 3];
     let part = 4.0 * PI / directions as f64;
-    for (mu, sine, phi, light) in rays {
-        let x = sine * phi.cos() / sun_sine;
-        let across = sine * sine * (2.0 * phi).cos() / (sun_sine * sun_sine);
-        for c in 0..3 {
-            let weighted = part * light[c];
+    for ([x, mu, z], light) in rays {
+        let across = (x * x - z * z) / (sun_sine * sun_sine);
+        let x = x / sun_sine;
+        for (c, mean) in light.mean.iter().enumerate() {
+            let weighted = part * mean;
             squares[c] += weighted * weighted;
             moments.whole[c] += weighted;
             moments.up[c] += weighted * mu;
@@ -385,24 +397,7 @@ pub fn plane_irradiance_by_paths(
     directions: usize,
     seed: u64,
 ) -> Vec<([f64; 3], [f64; 3])> {
-    let paths = Paths {
-        samples: 2,
-        seed,
-        ..Default::default()
-    };
-    let rays = parallel_map(directions, |i| {
-        let [u, v] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3]
-            .map(|step: f64| (0.5 + step * (i + 1) as f64).fract());
-        let (mu, phi) = (1.0 - 2.0 * u, 2.0 * PI * v);
-        let sine = (1.0 - mu * mu).sqrt();
-        let ray = SkyRay {
-            eye_altitude: h,
-            dir: [sine * phi.cos(), mu, sine * phi.sin()],
-            to_sun: [(1.0 - sun_mu * sun_mu).max(0.0).sqrt(), sun_mu, 0.0],
-            distance: f64::INFINITY,
-        };
-        (ray.dir, trace_sky(sky, &ray, &paths, i as u64))
-    });
+    let rays = light_around(sky, h, sun_mu, directions, seed);
     let part = 4.0 * PI / directions as f64;
     normals
         .iter()

@@ -4,8 +4,9 @@ use super::field::HeightField;
 use super::ground::Prepared;
 use super::land::Land;
 use crate::error::Error;
+use crate::exchange::compute;
 use crate::landscape::{Resources, Work};
-use crate::program::{Pipeline, PipelineOptions, ProgramSet};
+use crate::program::ProgramSet;
 use crate::programs::blocks::{Bake as BakeBlock, Clip as ClipBlock, Rectangle as RectangleBlock};
 use crate::view::WorldPos;
 
@@ -149,27 +150,6 @@ pub(super) fn group(
     })
 }
 
-fn compute(
-    device: &wgpu::Device,
-    programs: &ProgramSet,
-    features: &[&str],
-    constants: &[(&str, f64)],
-) -> Result<(wgpu::ComputePipeline, Vec<wgpu::BindGroupLayout>), Error> {
-    let ready = programs.get("terrain_bake", features)?.pipeline(
-        device,
-        &PipelineOptions {
-            constants,
-            ..Default::default()
-        },
-    )?;
-    match ready.pipeline {
-        Pipeline::Compute(pipeline) => Ok((pipeline, ready.bind_group_layouts)),
-        Pipeline::Render(_) => Err(Error::MissingStage {
-            program: "terrain_bake".to_owned(),
-        }),
-    }
-}
-
 /// Spacing of the finest level that a field can use: an eighth of its finest cells, a power of two.
 fn finest(field: &HeightField) -> f64 {
     let cells = f64::from(field.wavelength as f32) / f64::from(field.octaves - 1).exp2();
@@ -213,10 +193,12 @@ impl Clipmap {
             .min(needed);
         let levels = (needed / spacing).log2().round() as usize + 1;
         let kind = [("FIELD_KIND", f64::from(land.field.kind.number()))];
-        let (bake, bake_layouts) = compute(device, programs, &[], &kind)?;
-        let (maxima, maxima_layouts) = compute(device, programs, &["CLIP_MAXIMA"], &[])?;
-        let (tops, tops_layouts) = compute(device, programs, &["CLIP_TOPS"], &[])?;
-        let (horizon, horizon_layouts) = compute(device, programs, &["CLIP_HORIZON"], &[])?;
+        let (bake, bake_layouts) = compute(device, programs, "terrain_bake", &[], &kind)?;
+        let (maxima, maxima_layouts) =
+            compute(device, programs, "terrain_bake", &["CLIP_MAXIMA"], &[])?;
+        let (tops, tops_layouts) = compute(device, programs, "terrain_bake", &["CLIP_TOPS"], &[])?;
+        let (horizon, horizon_layouts) =
+            compute(device, programs, "terrain_bake", &["CLIP_HORIZON"], &[])?;
         let texture = |label, width: u32, height: u32, layers: u32, format, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),

@@ -1,11 +1,13 @@
 //! Heights of given places on the device: a query, not a part of a frame.
 
+use super::clipmap::group;
 use super::field::HeightField;
 use super::ground::{Ground, Prepared};
 use super::noise::Place;
-use crate::device::{Gpu, read_staging};
+use crate::device::Gpu;
 use crate::error::Error;
-use crate::program::{Pipeline, PipelineOptions, ProgramSet};
+use crate::exchange::{Exchange, compute};
+use crate::program::ProgramSet;
 use crate::programs::blocks::Field as FieldBlock;
 use crate::view::WorldPos;
 
@@ -57,36 +59,18 @@ pub fn heights(
         });
     }
     let (device, queue) = (&gpu.device, &gpu.queue);
-    let ready = programs.get("terrain_heights", &[])?.pipeline(
-        device,
-        &PipelineOptions {
-            constants: &[("FIELD_KIND", f64::from(field.kind.number()))],
-            ..Default::default()
-        },
-    )?;
-    let Pipeline::Compute(pipeline) = ready.pipeline else {
-        return Err(Error::MissingStage {
-            program: "terrain_heights".to_owned(),
-        });
-    };
-    let buffer = |label, size: usize, usage| {
-        device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size: size as u64,
-            usage,
-            mapped_at_creation: false,
-        })
-    };
-    use wgpu::BufferUsages as Usage;
+    let kind = [("FIELD_KIND", f64::from(field.kind.number()))];
+    let (pipeline, layouts) = compute(device, programs, "terrain_heights", &[], &kind)?;
     let block = prepared.block(Place {
         cell: [0; 2],
         frac: [0.0; 2],
     });
-    let uniform = buffer(
-        "veduta field",
-        FieldBlock::SIZE,
-        Usage::UNIFORM | Usage::COPY_DST,
-    );
+    let uniform = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("veduta field"),
+        size: FieldBlock::SIZE as u64,
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
     queue.write_buffer(&uniform, 0, &block.to_bytes());
     let mut results = Vec::with_capacity(positions.len());
     for part in positions.chunks(CHUNK) {
@@ -98,42 +82,15 @@ pub fn heights(
             rows.extend(footprint.to_le_bytes());
             rows.extend([0; 4]);
         }
-        let input = buffer(
-            "veduta places",
-            rows.len(),
-            Usage::STORAGE | Usage::COPY_DST,
-        );
-        queue.write_buffer(&input, 0, &rows);
-        let size = part.len() * RESULT;
-        let output = buffer("veduta heights", size, Usage::STORAGE | Usage::COPY_SRC);
-        let staging = buffer("veduta read back", size, Usage::COPY_DST | Usage::MAP_READ);
-        let groups: Vec<wgpu::BindGroup> = ready
-            .bind_group_layouts
+        let exchange = Exchange::new(device, queue, &rows, part.len() * RESULT);
+        let groups: Vec<wgpu::BindGroup> = layouts
             .iter()
-            .zip([&uniform, &input, &output])
-            .map(|(layout, buffer)| {
-                device.create_bind_group(&wgpu::BindGroupDescriptor {
-                    label: Some("veduta heights"),
-                    layout,
-                    entries: &[wgpu::BindGroupEntry {
-                        binding: 0,
-                        resource: buffer.as_entire_binding(),
-                    }],
-                })
-            })
+            .zip([&uniform, &exchange.input, &exchange.output])
+            .map(|(layout, buffer)| group(device, layout, &[buffer.as_entire_binding()]))
             .collect();
-        let mut encoder = device.create_command_encoder(&Default::default());
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&pipeline);
-            for (index, group) in (0..).zip(&groups) {
-                pass.set_bind_group(index, group, &[]);
-            }
-            pass.dispatch_workgroups(part.len().div_ceil(64) as u32, 1, 1);
-        }
-        encoder.copy_buffer_to_buffer(&output, 0, &staging, 0, size as u64);
-        queue.submit([encoder.finish()]);
-        let data = read_staging(device, &staging)?;
+        let encoder = device.create_command_encoder(&Default::default());
+        let workgroups = part.len().div_ceil(64) as u32;
+        let data = exchange.run(device, queue, encoder, &pipeline, &groups, workgroups)?;
         results.extend(data.chunks_exact(RESULT).map(|row| {
             let number =
                 |k: usize| f32::from_le_bytes([row[k], row[k + 1], row[k + 2], row[k + 3]]);

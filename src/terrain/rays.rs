@@ -4,9 +4,10 @@ use super::clipmap::{Clipmap, ClipmapOptions, group};
 use super::ground::Prepared;
 use super::land::Land;
 use super::real::Real;
-use crate::device::{Gpu, read_staging};
+use crate::device::Gpu;
 use crate::error::Error;
-use crate::program::{Pipeline, PipelineOptions, ProgramSet};
+use crate::exchange::{Exchange, compute};
+use crate::program::ProgramSet;
 use crate::programs::blocks::{Field as FieldBlock, Planet as PlanetBlock};
 use crate::view::WorldPos;
 
@@ -113,23 +114,11 @@ pub fn ray_hits(
     };
     let field = land.field.prepare::<f32>()?;
     let features: &[&str] = if fast { &["TERRAIN_FAST"] } else { &[] };
-    let program = programs.get("terrain_rays", features)?;
-    let all = [
+    let constants = [
         ("FIELD_KIND", f64::from(land.field.kind.number())),
         ("MAX_MARCHING_STEPS", 4000.0),
     ];
-    let ready = program.pipeline(
-        device,
-        &PipelineOptions {
-            constants: &all,
-            ..Default::default()
-        },
-    )?;
-    let Pipeline::Compute(pipeline) = ready.pipeline else {
-        return Err(Error::MissingStage {
-            program: "terrain_rays".to_owned(),
-        });
-    };
+    let (pipeline, layouts) = compute(device, programs, "terrain_rays", features, &constants)?;
     use wgpu::BufferUsages as Usage;
     let buffer = |label, size: usize, usage| {
         device.create_buffer(&wgpu::BufferDescriptor {
@@ -168,15 +157,7 @@ pub fn ray_hits(
                 rows.extend(number.to_le_bytes());
             }
         }
-        let input = buffer("veduta rays", rows.len(), Usage::STORAGE | Usage::COPY_DST);
-        queue.write_buffer(&input, 0, &rows);
-        let output = buffer("veduta hits", 48 * count, Usage::STORAGE | Usage::COPY_SRC);
-        let staging = buffer(
-            "veduta read back",
-            48 * count,
-            Usage::COPY_DST | Usage::MAP_READ,
-        );
-        let layouts = &ready.bind_group_layouts;
+        let exchange = Exchange::new(device, queue, &rows, 48 * count);
         let groups = if let Some(clipmap) = &mut clipmap {
             let _ = clipmap.prepare(queue, &mut encoder, eye, 0.0);
             let view = wgpu::BindingResource::TextureView;
@@ -194,14 +175,14 @@ pub fn ray_hits(
                     device,
                     &layouts[1],
                     &[
-                        input.as_entire_binding(),
+                        exchange.input.as_entire_binding(),
                         view(heights),
                         view(fine),
                         view(coarse),
                         view(places),
                     ],
                 ),
-                group(device, &layouts[2], &[output.as_entire_binding()]),
+                group(device, &layouts[2], &[exchange.output.as_entire_binding()]),
             ]
         } else {
             [
@@ -213,21 +194,12 @@ pub fn ray_hits(
                         planet_buffer.as_entire_binding(),
                     ],
                 ),
-                group(device, &layouts[1], &[input.as_entire_binding()]),
-                group(device, &layouts[2], &[output.as_entire_binding()]),
+                group(device, &layouts[1], &[exchange.input.as_entire_binding()]),
+                group(device, &layouts[2], &[exchange.output.as_entire_binding()]),
             ]
         };
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&pipeline);
-            for (index, group) in (0..).zip(&groups) {
-                pass.set_bind_group(index, group, &[]);
-            }
-            pass.dispatch_workgroups(count.div_ceil(64) as u32, 1, 1);
-        }
-        encoder.copy_buffer_to_buffer(&output, 0, &staging, 0, staging.size());
-        queue.submit([encoder.finish()]);
-        let data = read_staging(device, &staging)?;
+        let workgroups = count.div_ceil(64) as u32;
+        let data = exchange.run(device, queue, encoder, &pipeline, &groups, workgroups)?;
         for (i, row) in data.chunks_exact(48).enumerate() {
             let bits = |k: usize| [row[k], row[k + 1], row[k + 2], row[k + 3]];
             let number = |k: usize| f64::from(f32::from_le_bytes(bits(k)));

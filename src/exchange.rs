@@ -1,9 +1,10 @@
-//! Rows to a compute program and its results back: what every query does.
+//! Compute programs: their pipelines, and rows to them and results back, which every query does.
 
 use crate::error::Error;
+use crate::program::{Pipeline, PipelineOptions, ProgramSet, ReadyPipeline};
 
 /// Storage buffers of one query: rows in, results out.
-pub(super) struct Exchange {
+pub(crate) struct Exchange {
     /// What the program reads.
     pub input: wgpu::Buffer,
     /// What it writes.
@@ -67,9 +68,35 @@ impl Exchange {
 }
 
 /// Three numbers of a result, `at` bytes from its start.
-pub(super) fn three(result: &[u8], at: usize) -> [f32; 3] {
+pub(crate) fn three(result: &[u8], at: usize) -> [f32; 3] {
     [0, 4, 8].map(|k| {
         let b = &result[at + k..at + k + 4];
         f32::from_le_bytes([b[0], b[1], b[2], b[3]])
     })
+}
+
+/// The pipeline of a compute program with its layouts.
+pub(crate) fn compute(
+    device: &wgpu::Device,
+    programs: &ProgramSet,
+    name: &str,
+    features: &[&str],
+    constants: &[(&str, f64)],
+) -> Result<(wgpu::ComputePipeline, Vec<wgpu::BindGroupLayout>), Error> {
+    let ReadyPipeline {
+        pipeline,
+        bind_group_layouts,
+    } = programs.get(name, features)?.pipeline(
+        device,
+        &PipelineOptions {
+            constants,
+            ..Default::default()
+        },
+    )?;
+    match pipeline {
+        Pipeline::Compute(pipeline) => Ok((pipeline, bind_group_layouts)),
+        Pipeline::Render(_) => Err(Error::MissingStage {
+            program: name.to_owned(),
+        }),
+    }
 }
