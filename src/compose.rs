@@ -341,10 +341,13 @@ fn binding_type(ty: reflect::BindingType) -> Result<wgpu::BindingType, Error> {
             format: storage_format(&format!("{format:?}"))?,
             view_dimension: dimension(dim),
         },
-        B::Sampler { comparison } => wgpu::BindingType::Sampler(if comparison {
-            wgpu::SamplerBindingType::Comparison
-        } else {
-            wgpu::SamplerBindingType::Filtering
+        B::Sampler {
+            comparison,
+            filtering,
+        } => wgpu::BindingType::Sampler(match (comparison, filtering) {
+            (true, _) => wgpu::SamplerBindingType::Comparison,
+            (false, true) => wgpu::SamplerBindingType::Filtering,
+            (false, false) => wgpu::SamplerBindingType::NonFiltering,
         }),
     })
 }

@@ -50,12 +50,10 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         | "sky_probe" | "sky_query" | "probe" => &[&[]],
         "terrain" | "terrain_heights" => return vec![BTreeSet::new()],
         "terrain_bake" => {
-            let one = |flag: &str| BTreeSet::from([flag.to_owned()]);
             return vec![
                 BTreeSet::new(),
-                one("CLIP_MAXIMA"),
-                one("CLIP_TOPS"),
-                one("CLIP_HORIZON"),
+                BTreeSet::from(["CLIP_SECTORS".to_owned()]),
+                BTreeSet::from(["CLIP_SHADES".to_owned()]),
             ];
         }
         "terrain_rays" => {

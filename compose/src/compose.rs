@@ -911,6 +911,19 @@ fn common_type(a: BindingType, b: BindingType) -> Option<BindingType> {
             dim,
             multisampled,
         }),
+        (
+            B::Sampler {
+                comparison: false,
+                filtering: x,
+            },
+            B::Sampler {
+                comparison: false,
+                filtering: y,
+            },
+        ) => Some(B::Sampler {
+            comparison: false,
+            filtering: x || y,
+        }),
         _ if a == b => Some(a),
         _ => None,
     }

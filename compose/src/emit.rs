@@ -673,12 +673,15 @@ fn binding_type(w: &str, ty: BindingType) -> String {
                 view(dim)
             )
         }
-        BindingType::Sampler { comparison } => format!(
+        BindingType::Sampler {
+            comparison,
+            filtering,
+        } => format!(
             "{w}::BindingType::Sampler({w}::SamplerBindingType::{})",
-            if comparison {
-                "Comparison"
-            } else {
-                "Filtering"
+            match (comparison, filtering) {
+                (true, _) => "Comparison",
+                (false, true) => "Filtering",
+                (false, false) => "NonFiltering",
             }
         ),
     }

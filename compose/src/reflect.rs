@@ -50,9 +50,9 @@ pub enum ViewDimension {
 /// What reading a texture gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleType {
-    /// Floats; filterable if the program samples the texture through a sampler.
+    /// Floats; filterable if the program samples the texture through a sampler. Gathers do not count.
     Float {
-        /// A sampler reads it.
+        /// A sampler filters it.
         filterable: bool,
     },
     /// Depth.
@@ -100,6 +100,8 @@ pub enum BindingType {
     Sampler {
         /// It compares.
         comparison: bool,
+        /// It filters, and does not only gather.
+        filtering: bool,
     },
 }
 
@@ -282,11 +284,10 @@ pub(crate) fn stage(
             },
         });
     }
-    let mut sampled: BTreeSet<Handle<naga::GlobalVariable>> = BTreeSet::new();
+    let filtered = filtered(module);
     let mut used: BTreeSet<Handle<naga::GlobalVariable>> = BTreeSet::new();
     for index in 0..module.entry_points.len() {
         let entry = info.get_entry_point(index);
-        sampled.extend(entry.sampling_set.iter().map(|key| key.image));
         used.extend(
             module
                 .global_variables
@@ -303,7 +304,7 @@ pub(crate) fn stage(
         if !used.contains(&handle) {
             continue;
         }
-        let ty = binding_type(module, global, sampled.contains(&handle))
+        let ty = binding_type(module, global, filtered.contains(&handle))
             .map_err(|why| (name.clone(), why))?;
         if matches!(
             ty,
@@ -389,6 +390,107 @@ fn constant(module: &Module, expression: Handle<naga::Expression>) -> Option<f64
     }
 }
 
+/// Where a texture or a sampler comes from.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Origin {
+    Global(Handle<naga::GlobalVariable>),
+    Argument(u32),
+}
+
+fn origin(function: &naga::Function, of: Handle<naga::Expression>) -> Option<Origin> {
+    match function.expressions[of] {
+        naga::Expression::GlobalVariable(handle) => Some(Origin::Global(handle)),
+        naga::Expression::FunctionArgument(index) => Some(Origin::Argument(index)),
+        naga::Expression::Access { base, .. } | naga::Expression::AccessIndex { base, .. } => {
+            origin(function, base)
+        }
+        _ => None,
+    }
+}
+
+/// The functions that a block calls, with their arguments.
+fn calls<'a>(
+    block: &'a naga::Block,
+    found: &mut Vec<(Handle<naga::Function>, &'a [Handle<naga::Expression>])>,
+) {
+    for statement in block.iter() {
+        match statement {
+            naga::Statement::Call {
+                function,
+                arguments,
+                ..
+            } => found.push((*function, arguments)),
+            naga::Statement::Block(inner) => calls(inner, found),
+            naga::Statement::If { accept, reject, .. } => {
+                calls(accept, found);
+                calls(reject, found);
+            }
+            naga::Statement::Switch { cases, .. } => {
+                for case in cases {
+                    calls(&case.body, found);
+                }
+            }
+            naga::Statement::Loop {
+                body, continuing, ..
+            } => {
+                calls(body, found);
+                calls(continuing, found);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Textures and samplers with which a program filters, and not only gathers.
+fn filtered(module: &Module) -> BTreeSet<Handle<naga::GlobalVariable>> {
+    let mut by_function: Vec<BTreeSet<Origin>> = Vec::new();
+    let within = |function: &naga::Function, known: &[BTreeSet<Origin>]| {
+        let mut origins = BTreeSet::new();
+        for (_, expression) in function.expressions.iter() {
+            if let naga::Expression::ImageSample {
+                image,
+                sampler,
+                gather: None,
+                ..
+            } = expression
+            {
+                origins.extend(origin(function, *image));
+                origins.extend(origin(function, *sampler));
+            }
+        }
+        let mut called = Vec::new();
+        calls(&function.body, &mut called);
+        for (callee, arguments) in called {
+            // A function stands behind those that it calls.
+            let Some(inner) = known.get(callee.index()) else {
+                continue;
+            };
+            origins.extend(inner.iter().filter_map(|o| {
+                match o {
+                    Origin::Global(_) => Some(*o),
+                    Origin::Argument(index) => arguments
+                        .get(*index as usize)
+                        .and_then(|argument| origin(function, *argument)),
+                }
+            }));
+        }
+        origins
+    };
+    for (_, function) in module.functions.iter() {
+        let found = within(function, &by_function);
+        by_function.push(found);
+    }
+    module
+        .entry_points
+        .iter()
+        .flat_map(|entry| within(&entry.function, &by_function))
+        .filter_map(|o| match o {
+            Origin::Global(handle) => Some(handle),
+            Origin::Argument(_) => None,
+        })
+        .collect()
+}
+
 fn binding_type(
     module: &Module,
     global: &naga::GlobalVariable,
@@ -454,6 +556,7 @@ fn binding_type(
         }
         (_, TypeInner::Sampler { comparison }) => BindingType::Sampler {
             comparison: *comparison,
+            filtering: filterable,
         },
         _ => return Err("a binding of this type is not supported".to_owned()),
     })

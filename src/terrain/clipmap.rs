@@ -7,7 +7,9 @@ use crate::error::Error;
 use crate::exchange::compute;
 use crate::landscape::{Resources, Work};
 use crate::program::ProgramSet;
-use crate::programs::blocks::{Bake as BakeBlock, Clip as ClipBlock, Rectangle as RectangleBlock};
+use crate::programs::blocks::{
+    Clip as ClipBlock, Rectangle as RectangleBlock, Shade as ShadeBlock, Sweep as SweepBlock,
+};
 use crate::view::WorldPos;
 
 /// How finely and how far heights are baked.
@@ -32,11 +34,86 @@ impl Default for ClipmapOptions {
     }
 }
 
-/// Blocks of maxima, and by what the windows move (texels).
+/// By what the windows move (texels).
 const BLOCK: i64 = 32;
 
-/// Texels that a window keeps between what it serves and its border: half a move, and a block.
-const BORDER: i64 = BLOCK / 2 + BLOCK;
+/// Texels that a window keeps between what it serves and its border: half a move, and some.
+const BORDER: i64 = BLOCK / 2 + 4;
+
+/// Rings around the eye at most, a multiple of 64.
+const RINGS: u32 = 1024;
+
+/// Where an eye looks, as far as baking is concerned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Gaze {
+    /// Levels with finer texels wait until they are needed (m).
+    pub least: f64,
+    /// Distance from the eye within which rings are of one width (m): about that of the nearest ground.
+    pub near: f64,
+    /// Distance at which rays end (m).
+    pub far: f64,
+    /// The azimuths that are looked at, from +x towards +z: the first and the extent (rad).
+    pub azimuths: [f64; 2],
+    /// The light that throws shadows: the unit vector to it, and its angular radius (rad).
+    pub sun: Option<([f64; 3], f64)>,
+}
+
+/// The sun that shadows were made for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct SweptSun {
+    to_sun: [f64; 3],
+    angular_radius: f64,
+}
+
+/// By how much of its radius the sun may move before shadows are made anew.
+const SUN_SLACK: f64 = 0.05;
+
+impl SweptSun {
+    /// Whether another sun is so near that nobody sees it.
+    fn serves(&self, other: &SweptSun) -> bool {
+        let off: f64 = (0..3)
+            .map(|k| (self.to_sun[k] - other.to_sun[k]).powi(2))
+            .sum();
+        self.angular_radius == other.angular_radius && off.sqrt() <= SUN_SLACK * self.angular_radius
+    }
+
+    fn block(&self, planet_radius: f64) -> SweepBlock {
+        let [x, y, z] = self.to_sun;
+        let axis = usize::from(z.abs() > x.abs());
+        let (main, side) = if axis == 0 { (x, z) } else { (z, x) };
+        // A sun this near the zenith throws no shadow that is seen.
+        let elevation = y.atan2(x.hypot(z));
+        let most = 89_f64.to_radians();
+        let tangent = |e: f64| e.clamp(-most, most).tan();
+        let middle = tangent(elevation).clamp(-12.0, 12.0);
+        SweepBlock {
+            axis: axis as i32,
+            shear: if main.abs() > 1e-9 {
+                (side / main) as f32
+            } else {
+                0.0
+            },
+            upper: tangent(elevation + self.angular_radius) as f32,
+            lower: tangent(elevation - self.angular_radius) as f32,
+            growth: ((1.0 + middle * middle) / planet_radius) as f32,
+            sign: if main < 0.0 { -1.0 } else { 1.0 },
+            ..Default::default()
+        }
+    }
+}
+
+/// Heights that shadows reach.
+#[derive(Debug)]
+struct Shades {
+    pipeline: wgpu::ComputePipeline,
+    levels: Vec<Slot>,
+    /// What each level reads: heights and the next level; and where it writes.
+    sources: Vec<wgpu::BindGroup>,
+    targets: Vec<wgpu::BindGroup>,
+    view: wgpu::TextureView,
+    sun: Option<SweptSun>,
+    windows: Vec<Option<Window>>,
+}
 
 /// The part of a level that is baked: its lower corner in texels of the world.
 type Window = [i64; 2];
@@ -100,21 +177,18 @@ pub struct Clipmap {
     windows: Vec<Option<Window>>,
     first: usize,
     bake: wgpu::ComputePipeline,
-    maxima: wgpu::ComputePipeline,
-    tops: wgpu::ComputePipeline,
-    horizon: wgpu::ComputePipeline,
+    sweep: wgpu::ComputePipeline,
     rectangles: Vec<Slot>,
-    all_maxima: Vec<Slot>,
     bake_target: wgpu::BindGroup,
-    maxima_source: wgpu::BindGroup,
-    maxima_target: wgpu::BindGroup,
-    tops_source: wgpu::BindGroup,
-    tops_target: wgpu::BindGroup,
-    horizon_groups: [wgpu::BindGroup; 3],
-    /// How high the ground reaches in each sector around the eye.
-    pub(super) skyline: wgpu::TextureView,
-    /// Heights, maxima of blocks of 8, maxima of blocks of 32, places of the levels.
-    pub(super) views: [wgpu::TextureView; 4],
+    sweep_groups: [wgpu::BindGroup; 3],
+    /// Heights, tangents by sector and ring, places of the levels.
+    pub(super) views: [wgpu::TextureView; 3],
+    /// Sectors around the eye; the first that is made, and how many are.
+    pub(super) sectors: [i32; 3],
+    pub(super) wrapping: wgpu::Sampler,
+    shades: Option<Shades>,
+    /// The uniform `Sweep`.
+    pub(super) swept: wgpu::Buffer,
     places: wgpu::Texture,
     places_bytes: Vec<u8>,
     clip: wgpu::Buffer,
@@ -157,15 +231,16 @@ fn finest(field: &HeightField) -> f64 {
 }
 
 impl Clipmap {
-    /// Makes textures and pipelines; nothing is baked.
+    /// Makes textures and pipelines; nothing is baked. Shadows cost twice the memory of heights.
     ///
     /// # Errors
     /// As [`Land::check`]; [`Error::OutOfDomain`] for options; the faults of [`ProgramSet::get`] and of making the pipelines.
-    pub fn new(
+    pub(super) fn new(
         device: &wgpu::Device,
         programs: &ProgramSet,
         land: &Land,
         options: &ClipmapOptions,
+        shaded: bool,
     ) -> Result<Clipmap, Error> {
         land.check()?;
         let fault = |name: &str, value: String, domain: &str| Error::OutOfDomain {
@@ -194,11 +269,8 @@ impl Clipmap {
         let levels = (needed / spacing).log2().round() as usize + 1;
         let kind = [("FIELD_KIND", f64::from(land.field.kind.number()))];
         let (bake, bake_layouts) = compute(device, programs, "terrain_bake", &[], &kind)?;
-        let (maxima, maxima_layouts) =
-            compute(device, programs, "terrain_bake", &["CLIP_MAXIMA"], &[])?;
-        let (tops, tops_layouts) = compute(device, programs, "terrain_bake", &["CLIP_TOPS"], &[])?;
-        let (horizon, horizon_layouts) =
-            compute(device, programs, "terrain_bake", &["CLIP_HORIZON"], &[])?;
+        let (sweep, sweep_layouts) =
+            compute(device, programs, "terrain_bake", &["CLIP_SECTORS"], &[])?;
         let texture = |label, width: u32, height: u32, layers: u32, format, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
@@ -215,29 +287,24 @@ impl Clipmap {
                 view_formats: &[],
             })
         };
-        let layered = |label, side: u32, rows: u32| {
-            texture(
-                label,
-                side,
-                rows,
-                levels as u32,
-                wgpu::TextureFormat::R32Float,
-                wgpu::TextureUsages::STORAGE_BINDING,
-            )
-            .create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2Array),
-                ..Default::default()
-            })
-        };
-        let [side, of_8, of_32] = [1, 8, 32].map(|n| options.texels / n);
-        let heights = layered("veduta heights", side, side);
-        let fine = layered("veduta maxima of 8", of_8, of_8);
-        // The maximum of the level stands below.
-        let coarse = layered("veduta maxima of 32", of_32, of_32 + 1);
-        let skyline = texture(
-            "veduta skyline",
-            64,
-            1,
+        let heights = texture(
+            "veduta heights",
+            options.texels,
+            options.texels,
+            levels as u32,
+            wgpu::TextureFormat::R32Float,
+            wgpu::TextureUsages::STORAGE_BINDING,
+        )
+        .create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        });
+        // A sector is about as wide as four texels: narrower ones save rays fewer steps than they cost (measured).
+        let count = options.texels / 2;
+        let sectors = texture(
+            "veduta sectors",
+            RINGS + RINGS / 8 + RINGS / 64 + 1,
+            count,
             1,
             wgpu::TextureFormat::R32Float,
             wgpu::TextureUsages::STORAGE_BINDING,
@@ -246,7 +313,7 @@ impl Clipmap {
         let places = texture(
             "veduta levels",
             16,
-            1,
+            2,
             1,
             wgpu::TextureFormat::Rgba32Float,
             wgpu::TextureUsages::COPY_DST,
@@ -259,25 +326,87 @@ impl Clipmap {
                 Slot { buffer, group }
             })
             .collect();
-        let all_maxima = (0..levels)
-            .map(|_| {
-                let buffer = buffer(device, "veduta level", BakeBlock::SIZE);
-                let group = group(device, &maxima_layouts[0], &[buffer.as_entire_binding()]);
-                Slot { buffer, group }
-            })
-            .collect();
         // Without bounds (a program's own function) rays end at 20 km.
         let top = land.field.bounds().map_or(2e4, |b| b.maximum) as f32;
         let places_view = places.create_view(&Default::default());
         let clip = buffer(device, "veduta clipmap", ClipBlock::SIZE);
-        let horizon_groups = [
-            group(device, &horizon_layouts[0], &[clip.as_entire_binding()]),
+        let wrapping = device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("veduta repeats"),
+            address_mode_u: wgpu::AddressMode::Repeat,
+            address_mode_v: wgpu::AddressMode::Repeat,
+            ..Default::default()
+        });
+        let swept = buffer(device, "veduta sun", SweepBlock::SIZE);
+        let shades = if shaded {
+            let (pipeline, layouts) =
+                compute(device, programs, "terrain_bake", &["CLIP_SHADES"], &[])?;
+            // With one level the second is a place to read nothing from.
+            let layers = levels.max(2) as u32;
+            let shades = texture(
+                "veduta shadows",
+                options.texels,
+                options.texels,
+                layers,
+                wgpu::TextureFormat::Rg32Float,
+                wgpu::TextureUsages::STORAGE_BINDING,
+            );
+            let layer = |layer: u32, count: u32| {
+                shades.create_view(&wgpu::TextureViewDescriptor {
+                    dimension: Some(wgpu::TextureViewDimension::D2Array),
+                    base_array_layer: layer,
+                    array_layer_count: Some(count),
+                    ..Default::default()
+                })
+            };
+            Some(Shades {
+                levels: (0..levels)
+                    .map(|_| {
+                        let buffer = buffer(device, "veduta shadows of a level", ShadeBlock::SIZE);
+                        let group = group(device, &layouts[0], &[buffer.as_entire_binding()]);
+                        Slot { buffer, group }
+                    })
+                    .collect(),
+                sources: (0..levels as u32)
+                    .map(|l| {
+                        let next = layer((l + 1) % layers, 1);
+                        let resources = [
+                            wgpu::BindingResource::TextureView(&heights),
+                            wgpu::BindingResource::TextureView(&next),
+                            wgpu::BindingResource::Sampler(&wrapping),
+                        ];
+                        group(device, &layouts[1], &resources)
+                    })
+                    .collect(),
+                targets: (0..levels as u32)
+                    .map(|l| {
+                        let own = layer(l, 1);
+                        group(
+                            device,
+                            &layouts[2],
+                            &[wgpu::BindingResource::TextureView(&own)],
+                        )
+                    })
+                    .collect(),
+                pipeline,
+                view: layer(0, layers),
+                sun: None,
+                windows: vec![None; levels],
+            })
+        } else {
+            None
+        };
+        let sweep_groups = [
+            group(device, &sweep_layouts[0], &[clip.as_entire_binding()]),
             group(
                 device,
-                &horizon_layouts[1],
-                &[view(&fine), view(&places_view)],
+                &sweep_layouts[1],
+                &[
+                    view(&heights),
+                    view(&places_view),
+                    wgpu::BindingResource::Sampler(&wrapping),
+                ],
             ),
-            group(device, &horizon_layouts[2], &[view(&skyline)]),
+            group(device, &sweep_layouts[2], &[view(&sectors)]),
         ];
         Ok(Clipmap {
             field,
@@ -289,19 +418,15 @@ impl Clipmap {
             windows: vec![None; levels],
             first: 0,
             bake,
-            maxima,
-            tops,
-            horizon,
+            sweep,
             rectangles,
-            all_maxima,
             bake_target: group(device, &bake_layouts[2], &[view(&heights)]),
-            maxima_source: group(device, &maxima_layouts[1], &[view(&heights)]),
-            maxima_target: group(device, &maxima_layouts[2], &[view(&fine), view(&coarse)]),
-            tops_source: group(device, &tops_layouts[1], &[view(&fine)]),
-            tops_target: group(device, &tops_layouts[2], &[view(&coarse)]),
-            horizon_groups,
-            skyline,
-            views: [heights, fine, coarse, places_view],
+            sweep_groups,
+            views: [heights, sectors, places_view],
+            sectors: [count as i32, 0, 0],
+            wrapping,
+            shades,
+            swept,
             places,
             places_bytes: Vec::new(),
             clip,
@@ -319,6 +444,11 @@ impl Clipmap {
         f64::from(self.top)
     }
 
+    /// Heights that shadows reach, if they were asked for.
+    pub(super) fn shades(&self) -> Option<&wgpu::TextureView> {
+        self.shades.as_ref().map(|s| &s.view)
+    }
+
     /// The uniform `Clip`.
     pub(super) fn clip(&self) -> &wgpu::Buffer {
         &self.clip
@@ -332,40 +462,48 @@ impl Clipmap {
     /// What it keeps on the device.
     pub fn resources(&self) -> Resources {
         let side = self.texels as u64;
-        let level = 4 * (side * side + side * side / 64 + side * side / 1024 + side / 32);
-        let slots = (self.rectangles.len() + self.all_maxima.len()) as u32;
+        let level = 4 * side * side;
+        let sectors = 4 * self.sectors[0] as u64 * u64::from(RINGS + RINGS / 8 + RINGS / 64 + 1);
+        let slots = self.rectangles.len() as u32;
+        let shaded = self.shades.as_ref().map_or(0, |s| s.levels.len());
+        let shades = 2 * level * if shaded == 0 { 0 } else { shaded.max(2) as u64 };
         Resources {
-            pipelines: 4,
-            bind_groups: slots + 8,
-            bindings: slots + 10,
-            buffers: slots + 1,
+            pipelines: 2 + u32::from(shaded > 0),
+            bind_groups: slots + 4 + 3 * shaded as u32,
+            bindings: slots + 6 + 5 * shaded as u32,
+            buffers: slots + 2 + shaded as u32,
             buffer_bytes: (self.rectangles.len() * RectangleBlock::SIZE
-                + self.all_maxima.len() * BakeBlock::SIZE
-                + ClipBlock::SIZE) as u64,
-            textures: 5,
-            texture_bytes: level * self.levels as u64 + 512,
+                + ClipBlock::SIZE
+                + SweepBlock::SIZE
+                + shaded * ShadeBlock::SIZE) as u64,
+            samplers: 1,
+            textures: 3 + u32::from(shaded > 0),
+            texture_bytes: level * self.levels as u64 + shades + sectors + 512,
             ..Default::default()
         }
     }
 
-    /// Records what has to be baked for an eye, and uploads where it is on every level. Levels that are finer than `least` metres wait until they are
-    /// needed.
-    pub fn prepare(
+    /// Records what has to be baked for an eye, and uploads where it is on every level.
+    pub(super) fn prepare(
         &mut self,
         queue: &wgpu::Queue,
         encoder: &mut wgpu::CommandEncoder,
         eye: WorldPos,
-        least: f64,
+        gaze: &Gaze,
     ) -> Work {
         let mut work = Work::default();
         let mut moved = false;
         let eye = eye.normalized();
-        self.first = ((least / self.spacing).max(1.0).log2().floor() as usize).min(self.levels - 1);
-        let mut places = Vec::with_capacity(256);
-        let mut jobs: Vec<(usize, usize, [i64; 2])> = Vec::new();
+        self.first =
+            ((gaze.least / self.spacing).max(1.0).log2().floor() as usize).min(self.levels - 1);
+        let mut places = Vec::with_capacity(512);
+        let mut in_windows = Vec::with_capacity(256);
+        let mut eyes = Vec::with_capacity(16);
+        let mut jobs: Vec<(usize, [i64; 2])> = Vec::new();
         for level in 0..16_usize {
             if level >= self.levels {
                 places.extend([0; 16]);
+                in_windows.extend([0; 16]);
                 continue;
             }
             let spacing = self.spacing * (level as f64).exp2();
@@ -391,11 +529,16 @@ impl Clipmap {
             }
             places.extend(((1.0 / spacing) as f32).to_le_bytes());
             places.extend((spacing as f32).to_le_bytes());
+            let corner = |cell: i64| (cell - self.texels / 2 + BLOCK / 2).div_euclid(BLOCK) * BLOCK;
+            let window = [corner(x.0), corner(z.0)];
+            let eye_in: [f32; 2] =
+                [(x, 0), (z, 1)].map(|((cell, rest), k)| ((cell - window[k]) as f64 + rest) as f32);
+            in_windows.extend(eye_in.iter().flat_map(|c| c.to_le_bytes()));
+            in_windows.extend([0; 8]);
+            eyes.push((window, eye_in));
             if level < self.first {
                 continue;
             }
-            let corner = |cell: i64| (cell - self.texels / 2 + BLOCK / 2).div_euclid(BLOCK) * BLOCK;
-            let window = [corner(x.0), corner(z.0)];
             if self.windows[level] == Some(window) {
                 continue;
             }
@@ -429,19 +572,30 @@ impl Clipmap {
                 queue.write_buffer(&self.rectangles[slot].buffer, 0, &bytes);
                 work.writes += 1;
                 work.bytes += bytes.len() as u64;
-                jobs.push((level, slot, size));
+                jobs.push((slot, size));
             }
             self.windows[level] = Some(window);
-            let block = BakeBlock {
-                texels: self.texels as i32,
-                level: level as i32,
-            };
-            let bytes = block.to_bytes();
-            queue.write_buffer(&self.all_maxima[level].buffer, 0, &bytes);
-            work.writes += 1;
-            work.bytes += bytes.len() as u64;
+            work.bakes += 1;
         }
+        places.extend(in_windows);
+        let shaded = self.plan_shades(queue, &eyes, gaze, &mut work);
+        let width = std::f64::consts::TAU / f64::from(self.sectors[0]);
+        let [from, extent] = gaze.azimuths;
+        let first = (from / width).floor() as i32 - 1;
+        let count = ((extent / width).ceil() as i32 + 3).min(self.sectors[0]);
+        self.sectors = [self.sectors[0], first.rem_euclid(self.sectors[0]), count];
+        let scale = gaze
+            .near
+            .max(4.0 * self.spacing * (self.first as f64).exp2());
+        let span = (gaze.far.min(self.reach() * std::f64::consts::SQRT_2) / scale).asinh();
+        let growth = width.max(span / f64::from(RINGS));
         let clip = ClipBlock {
+            rings: ((span / growth / 64.0).ceil() as i32 * 64).min(RINGS as i32),
+            sectors: self.sectors[0],
+            first_sector: self.sectors[1],
+            made_sectors: count,
+            ring_scale: scale as f32,
+            ring_growth: growth as f32,
             ground_radius: self.planet_radius as f32,
             eye_altitude: eye.altitude() as f32,
             spacing: self.spacing as f32,
@@ -450,6 +604,7 @@ impl Clipmap {
             texels: self.texels as i32,
             first: self.first as i32,
             levels: self.levels as i32,
+            ..Default::default()
         };
         let bytes = clip.to_bytes().to_vec();
         if bytes != self.clip_bytes {
@@ -475,45 +630,92 @@ impl Clipmap {
             self.places_bytes = places;
             moved = true;
         }
-        if jobs.is_empty() && !moved {
+        if jobs.is_empty() && !moved && shaded.is_empty() {
             return work;
         }
         let mut pass = encoder.begin_compute_pass(&Default::default());
         pass.set_pipeline(&self.bake);
         pass.set_bind_group(2, &self.bake_target, &[]);
-        for (_, slot, size) in &jobs {
+        for (slot, size) in &jobs {
             pass.set_bind_group(0, &self.rectangles[*slot].group, &[]);
             let [x, z] = size.map(|s| (s as u32).div_ceil(8));
             pass.dispatch_workgroups(x, z, 1);
             work.dispatches += 1;
         }
-        pass.set_pipeline(&self.maxima);
-        pass.set_bind_group(1, &self.maxima_source, &[]);
-        pass.set_bind_group(2, &self.maxima_target, &[]);
-        let mut levels: Vec<usize> = jobs.iter().map(|j| j.0).collect();
-        levels.dedup();
-        for level in &levels {
-            pass.set_bind_group(0, &self.all_maxima[*level].group, &[]);
-            let groups = (self.texels / BLOCK) as u32;
-            pass.dispatch_workgroups(groups, groups, 1);
-            work.dispatches += 1;
-            work.bakes += 1;
-        }
-        pass.set_pipeline(&self.tops);
-        pass.set_bind_group(1, &self.tops_source, &[]);
-        pass.set_bind_group(2, &self.tops_target, &[]);
-        for level in &levels {
-            pass.set_bind_group(0, &self.all_maxima[*level].group, &[]);
-            pass.dispatch_workgroups(1, 1, 1);
+        if moved || !jobs.is_empty() {
+            pass.set_pipeline(&self.sweep);
+            for (index, group) in (0..).zip(&self.sweep_groups) {
+                pass.set_bind_group(index, group, &[]);
+            }
+            pass.dispatch_workgroups(self.sectors[2] as u32, 1, 1);
             work.dispatches += 1;
         }
-        pass.set_pipeline(&self.horizon);
-        for (index, group) in (0..).zip(&self.horizon_groups) {
-            pass.set_bind_group(index, group, &[]);
+        if let Some(shades) = &self.shades {
+            pass.set_pipeline(&shades.pipeline);
+            // From the coarsest, which lies nearest to the sun of all that a line meets.
+            for level in shaded.into_iter().rev() {
+                pass.set_bind_group(0, &shades.levels[level].group, &[]);
+                pass.set_bind_group(1, &shades.sources[level], &[]);
+                pass.set_bind_group(2, &shades.targets[level], &[]);
+                pass.dispatch_workgroups((self.texels as u32).div_ceil(64), 1, 1);
+                work.dispatches += 1;
+            }
         }
-        pass.dispatch_workgroups(1, 1, 1);
-        work.dispatches += 1;
         work
+    }
+
+    /// Uploads what the shadows need, and says of which levels they have to be made.
+    fn plan_shades(
+        &mut self,
+        queue: &wgpu::Queue,
+        eyes: &[(Window, [f32; 2])],
+        gaze: &Gaze,
+        work: &mut Work,
+    ) -> Vec<usize> {
+        let (Some(shades), Some((to_sun, angular_radius))) = (&mut self.shades, gaze.sun) else {
+            return Vec::new();
+        };
+        let sun = SweptSun {
+            to_sun,
+            angular_radius,
+        };
+        let same = shades.sun.is_some_and(|s| s.serves(&sun));
+        if !same {
+            shades.sun = Some(sun);
+            shades.windows.fill(None);
+        }
+        let block = shades.sun.unwrap_or(sun).block(self.planet_radius);
+        let mut send = |buffer: &wgpu::Buffer, bytes: &[u8]| {
+            queue.write_buffer(buffer, 0, bytes);
+            work.writes += 1;
+            work.bytes += bytes.len() as u64;
+        };
+        if !same {
+            send(&self.swept, &block.to_bytes());
+        }
+        let mut levels = Vec::new();
+        for level in self.first..self.levels {
+            let (window, eye) = eyes[level];
+            if shades.windows[level] == Some(window) {
+                continue;
+            }
+            shades.windows[level] = Some(window);
+            let next = level + 1;
+            let shade = ShadeBlock {
+                sweep: block,
+                corner: window.map(|c| c.rem_euclid(self.texels) as i32),
+                eye,
+                next_eye: eyes.get(next).map_or([0.0; 2], |e| e.1),
+                texels: self.texels as i32,
+                level: level as i32,
+                next: if next < self.levels { next as i32 } else { -1 },
+                spacing: (self.spacing * (level as f64).exp2()) as f32,
+                ..Default::default()
+            };
+            send(&shades.levels[level].buffer, &shade.to_bytes());
+            levels.push(level);
+        }
+        levels
     }
 }
 

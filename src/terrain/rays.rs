@@ -1,6 +1,6 @@
 //! Where rays meet a terrain: on the device, along both paths, and on the processor.
 
-use super::clipmap::{Clipmap, ClipmapOptions, group};
+use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group};
 use super::ground::Prepared;
 use super::land::Land;
 use super::real::Real;
@@ -108,7 +108,7 @@ pub fn ray_hits(
     };
     let fast = path == RayPath::Fast;
     let mut clipmap = if fast {
-        Some(Clipmap::new(device, programs, land, &options)?)
+        Some(Clipmap::new(device, programs, land, &options, false)?)
     } else {
         None
     };
@@ -159,9 +159,17 @@ pub fn ray_hits(
         }
         let exchange = Exchange::new(device, queue, &rows, 48 * count);
         let groups = if let Some(clipmap) = &mut clipmap {
-            let _ = clipmap.prepare(queue, &mut encoder, eye, 0.0);
+            let above = (eye.altitude() - f64::from(field.ground(eye, 0.0).height)).abs();
+            let gaze = Gaze {
+                least: 0.0,
+                near: if above.is_finite() { above } else { 1.0 },
+                far: farthest,
+                azimuths: [0.0, std::f64::consts::TAU],
+                sun: None,
+            };
+            let _ = clipmap.prepare(queue, &mut encoder, eye, &gaze);
             let view = wgpu::BindingResource::TextureView;
-            let [heights, fine, coarse, places] = &clipmap.views;
+            let [heights, sectors, places] = &clipmap.views;
             [
                 group(
                     device,
@@ -177,9 +185,9 @@ pub fn ray_hits(
                     &[
                         exchange.input.as_entire_binding(),
                         view(heights),
-                        view(fine),
-                        view(coarse),
+                        view(sectors),
                         view(places),
+                        wgpu::BindingResource::Sampler(&clipmap.wrapping),
                     ],
                 ),
                 group(device, &layouts[2], &[exchange.output.as_entire_binding()]),

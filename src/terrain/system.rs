@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::clipmap::{Clipmap, ClipmapOptions, group};
+use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group};
 use super::land::Land;
 use crate::error::Error;
 use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
@@ -101,6 +101,33 @@ pub struct Terrain {
     seen: bool,
 }
 
+/// The azimuths that a picture shows, from +x towards +z: the first and the extent (rad), from the ray through its middle and those from there to its borders.
+fn azimuths([middle, right, up]: [Vec3; 3]) -> [f64; 2] {
+    let [middle, right, up] = [middle, right, up].map(|v| v.as_dvec3());
+    let all = [0.0, std::f64::consts::TAU];
+    // Where the vertical meets the picture.
+    let axes = glam::DMat3::from_cols(middle, right, up);
+    if axes.determinant().abs() < 1e-12 {
+        return all;
+    }
+    let zenith = axes.inverse() * glam::DVec3::Y;
+    let edge = 1.001 * zenith.x.abs();
+    if zenith.y.abs() <= edge && zenith.z.abs() <= edge {
+        return all;
+    }
+    // Borders are great circles, along which the azimuth is monotone.
+    let turn =
+        |v: glam::DVec3| (middle.x * v.z - middle.z * v.x).atan2(middle.x * v.x + middle.z * v.z);
+    let turns = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]
+        .map(|[x, y]| turn(middle + x * right + y * up));
+    let first = turns.into_iter().fold(0.0, f64::min);
+    let last = turns.into_iter().fold(0.0, f64::max);
+    if last - first > 3.1 {
+        return all;
+    }
+    [middle.z.atan2(middle.x) + first, last - first]
+}
+
 impl Terrain {
     /// Builds pipelines and makes room for heights.
     ///
@@ -144,12 +171,12 @@ impl Terrain {
                 levels: 16,
                 reach: options.far,
             },
+            true,
         )?;
         let constants = [
             ("FIELD_KIND", f64::from(options.land.field.kind.number())),
             ("OUTPUT", output),
             ("MAX_MARCHING_STEPS", if low { 250.0 } else { 500.0 }),
-            ("MAX_MARCHING_STEPS_SHADOW", if low { 24.0 } else { 60.0 }),
             ("REFINE_STEPS", if low { 1.0 } else { 2.0 }),
             ("ROCK_CHEAP", f64::from(u8::from(low))),
         ];
@@ -188,7 +215,8 @@ impl Terrain {
         let view = buffer("veduta terrain view", ViewBlock::SIZE);
         let field = buffer("veduta field", FieldBlock::SIZE);
         let rock = buffer("veduta rock", RockBlock::SIZE);
-        let [heights, fine, coarse, places] = &clipmap.views;
+        let [heights, sectors, places] = &clipmap.views;
+        let shades = clipmap.shades().unwrap_or(heights);
         let texture = wgpu::BindingResource::TextureView;
         let groups = vec![
             group(
@@ -199,6 +227,7 @@ impl Terrain {
                     field.as_entire_binding(),
                     clipmap.clip().as_entire_binding(),
                     rock.as_entire_binding(),
+                    clipmap.swept.as_entire_binding(),
                 ],
             ),
             group(
@@ -206,10 +235,10 @@ impl Terrain {
                 &ready.bind_group_layouts[1],
                 &[
                     texture(heights),
-                    texture(fine),
-                    texture(coarse),
+                    texture(sectors),
                     texture(places),
-                    texture(&clipmap.skyline),
+                    texture(shades),
+                    wgpu::BindingResource::Sampler(&clipmap.wrapping),
                 ],
             ),
         ];
@@ -239,7 +268,7 @@ impl Terrain {
         Resources {
             pipelines: clipmap.pipelines + 1,
             bind_groups: clipmap.bind_groups + 2,
-            bindings: clipmap.bindings + 9,
+            bindings: clipmap.bindings + 10,
             buffers: clipmap.buffers + 3,
             buffer_bytes: clipmap.buffer_bytes
                 + (ViewBlock::SIZE + FieldBlock::SIZE + RockBlock::SIZE) as u64,
@@ -293,8 +322,18 @@ impl Terrain {
         // Nothing seen is much nearer than the ground below; a level finer than a pixel there would not be used. NaN for a program's own function.
         let clearance = eye.altitude() - f64::from(field.ground(eye, 0.0).height);
         let nearest = if clearance.is_nan() { 0.0 } else { clearance };
-        let least = 0.35 * f64::from(pixel_angle) * nearest.max(0.0);
-        let mut work = self.clipmap.prepare(queue, encoder, eye, least);
+        let far = self.far.min(self.clipmap.reach());
+        let gaze = Gaze {
+            least: 0.35 * f64::from(pixel_angle) * nearest.max(0.0),
+            near: nearest.abs(),
+            far,
+            azimuths: azimuths([middle, right, up]),
+            sun: (lights.sun != Vec3::ZERO).then(|| {
+                let to_sun = view.sun.to_light.normalize_or(Vec3::Y).as_dvec3();
+                (to_sun.to_array(), f64::from(view.sun.angular_radius))
+            }),
+        };
+        let mut work = self.clipmap.prepare(queue, encoder, eye, &gaze);
         // From above all ground, rays that rise meet none; those of a picture lie between those of its corners.
         let rises = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]
             .iter()
@@ -305,7 +344,7 @@ impl Terrain {
             ray_middle: middle.to_array(),
             pixel_angle,
             ray_right: right.to_array(),
-            far: self.far.min(self.clipmap.reach()) as f32,
+            far: far as f32,
             ray_up: up.to_array(),
             exposure: view.exposure,
             forward: view
@@ -317,13 +356,16 @@ impl Terrain {
             to_sun: view.sun.to_light.normalize_or(Vec3::Y).to_array(),
             depth_offset: scale,
             sun_light: lights.sun.to_array(),
-            sun_width: view.sun.angular_radius.tan().max(1e-4),
             sky_light: lights.sky.to_array(),
             snow_edge_low: m.snow_edge_low,
             bounce_light: lights.bounce.to_array(),
             snow_edge_high: m.snow_edge_high,
             snow_albedo: m.snow,
             snow_noise: m.snow_noise,
+            sectors: self.clipmap.sectors[0],
+            first_sector: self.clipmap.sectors[1],
+            made_sectors: self.clipmap.sectors[2],
+            ..Default::default()
         };
         let wavelength = f64::from(m.rock_wavelength);
         let [x, z] = [eye.lattice(0, wavelength)?, eye.lattice(2, wavelength)?];

@@ -25,14 +25,16 @@ struct TerrainView {
     to_sun: vec3<f32>,
     depth_offset: f32,
     sun_light: vec3<f32>,
-    // Tangent of the sun's angular radius.
-    sun_width: f32,
     sky_light: vec3<f32>,
     snow_edge_low: f32,
     bounce_light: vec3<f32>,
     snow_edge_high: f32,
     snow_albedo: vec3<f32>,
     snow_noise: f32,
+    // Sectors around the eye, and those that were made.
+    sectors: i32,
+    first_sector: i32,
+    made_sectors: i32,
 }
 
 @group(0) @binding(0) var<uniform> draw_view: TerrainView;
@@ -42,9 +44,7 @@ struct TerrainView {
 #VERTEX{
     #USE{ VARYING }#
     #CODE{
-@group(1) @binding(4) var horizon: texture_2d<f32>;
-
-const SECTORS_PER_RADIAN: f32 = 10.18591636;
+@group(1) @binding(1) var sectors: texture_2d<f32>;
 
 fn ray_through(clip: vec2<f32>) -> vec3<f32> {
     return draw_view.ray_middle + clip.x * draw_view.ray_right + clip.y * draw_view.ray_up;
@@ -74,11 +74,13 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
     // Tiles around the zenith see all sectors.
     let wide = right - left > 1.2;
     let azimuth = atan2(middle.z, middle.x);
-    let first = select(i32(floor((azimuth + left - 1e-3) * SECTORS_PER_RADIAN)), 0, wide);
-    let last = select(i32(floor((azimuth + right + 1e-3) * SECTORS_PER_RADIAN)), 63, wide);
+    let by_radian = f32(draw_view.sectors) * 0.15915494309;
+    let first = select(i32(floor((azimuth + left - 1e-3) * by_radian)), draw_view.first_sector, wide);
+    let last = select(i32(floor((azimuth + right + 1e-3) * by_radian)), draw_view.first_sector + draw_view.made_sectors - 1, wide);
+    let column = i32(textureDimensions(sectors).x) - 1;
     var skyline = -1e30;
     for (var j = first; j <= last; j++) {
-        skyline = max(skyline, textureLoad(horizon, vec2<i32>(j & 63, 0), 0).x);
+        skyline = max(skyline, textureLoad(sectors, vec2<i32>(column, j & (draw_view.sectors - 1)), 0).x);
     }
     let lower = least / select(max(cos(right - left), 0.3), 1.0, least > 0.0);
     let seen = skyline >= lower - 1e-3 * (1.0 + abs(lower)) || (wide && least < 0.0);
@@ -90,7 +92,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #FRAGMENT{
     #CODE{
 #import veduta::planet::shell::{altitude_of}
-#import veduta::terrain::clipmap::{Clip, clip_hit, clip_shadow, baked_height}
+#import veduta::terrain::clipmap::{Clip, Sweep, clip_hit, sun_share}
 #import veduta::terrain::field::{Field}
 #import veduta::terrain::refine::{refined_hit}
 #import veduta::terrain::material::{Rock, faded_noise, rock_low_faded, rock_high_faded, snow_blend}
@@ -104,15 +106,16 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 @group(0) @binding(1) var<uniform> field: Field;
 @group(0) @binding(2) var<uniform> clip: Clip;
 @group(0) @binding(3) var<uniform> rock: Rock;
+@group(0) @binding(4) var<uniform> sweep: Sweep;
 @group(1) @binding(0) var heights: texture_2d_array<f32>;
-@group(1) @binding(1) var fine: texture_2d_array<f32>;
-@group(1) @binding(2) var coarse: texture_2d_array<f32>;
-@group(1) @binding(3) var places: texture_2d<f32>;
+@group(1) @binding(1) var sectors: texture_2d<f32>;
+@group(1) @binding(2) var places: texture_2d<f32>;
+@group(1) @binding(3) var shades: texture_2d_array<f32>;
+@group(1) @binding(4) var wrapping: sampler;
 
 override FIELD_KIND: i32 = 2;
 override OUTPUT: i32 = 0;
 override MAX_MARCHING_STEPS: i32 = 200;
-override MAX_MARCHING_STEPS_SHADOW: i32 = 60;
 // Steps from the baked ground to the field.
 override REFINE_STEPS: i32 = 2;
 // Whether the rock has one fractal instead of four.
@@ -141,7 +144,7 @@ fn shown(radiance: vec3<f32>, pixel: vec2<f32>) -> vec4<f32> {
 fn draw(in: Corner) -> Shown {
     let dir = normalize(in.ray);
     let angle = draw_view.pixel_angle;
-    let hit = clip_hit(heights, fine, coarse, places, clip, vec3<f32>(0.0), dir, 0.0, draw_view.far, MAX_MARCHING_STEPS);
+    let hit = clip_hit(heights, wrapping, sectors, places, clip, dir, draw_view.far, MAX_MARCHING_STEPS);
     // A ray that ran out of steps close to the ground has almost met it.
     let capped = hit.distance < 0.0 && hit.steps == MAX_MARCHING_STEPS && hit.clearance < 0.02 * hit.reached;
     let met = select(hit.distance, hit.reached, capped);
@@ -152,11 +155,7 @@ fn draw(in: Corner) -> Shown {
     let point = dir * found.distance;
     let footprint = select(1e30, angle * found.distance, is_met);
     let altitude = altitude_of(clip.ground_radius, clip.eye_altitude, point);
-    // From where the baked ground is, which may be above the field.
-    let lift = max(baked_height(heights, places, clip, point.xz, 0) - altitude, 0.0) + 0.3 * hit.spacing;
-    let facing = dot(found.normal, draw_view.to_sun) + sqrt(found.ground.lost);
-    let rounds = select(0, MAX_MARCHING_STEPS_SHADOW, is_met && facing > 0.0);
-    let light = clip_shadow(heights, places, clip, point, draw_view.to_sun, draw_view.sun_width, lift, draw_view.far, rounds);
+    let light = sun_share(heights, shades, wrapping, places, clip, sweep, point.xz);
     let place = vec3<f32>(point.x, altitude, point.z);
     var albedo = vec3<f32>(0.0);
     if ROCK_CHEAP != 0 {

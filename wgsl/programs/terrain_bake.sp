@@ -1,123 +1,150 @@
-Heights of a rectangle of one level of a clipmap; the maxima of blocks of a level, and that of the level; how high the ground reaches around the eye. Nothing is drawn.
+Heights of a rectangle of one level of a clipmap; how high the ground stands around the eye, by sector and ring; how high its shadow reaches. Nothing is drawn.
 
 #PROGRAM{ terrain_bake }#
 
 #COMPUTE{
     #CODE{
-#ifdef CLIP_MAXIMA
-// One invocation a block of 8 x 8 texels; a workgroup makes 4 x 4 of them, and their maximum.
-struct Bake {
-    texels: i32,
-    level: i32,
-}
+#ifdef CLIP_SECTORS
+// The tangents that clear the ground of each ring of a sector; behind them the maxima of 8 and of 64 rings, and that of all.
+#import veduta::terrain::clipmap::{Clip, corners, level_of, ring_radius, clearing_tangent}
 
-@group(0) @binding(0) var<uniform> bake: Bake;
+@group(0) @binding(0) var<uniform> clip: Clip;
 @group(1) @binding(0) var heights: texture_2d_array<f32>;
-@group(2) @binding(0) var fine: texture_storage_2d_array<r32float, write>;
-@group(2) @binding(1) var coarse: texture_storage_2d_array<r32float, write>;
-
-var<workgroup> found: array<f32, 16>;
-
-@compute @workgroup_size(4, 4)
-fn maxima(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) index: u32, @builtin(workgroup_id) group: vec3<u32>) {
-    let mask = vec2<i32>(bake.texels - 1);
-    let corner = vec2<i32>(id.xy) * 8;
-    var top = -1e30;
-    for (var k = 0; k < 81; k++) {
-        let texel = (corner + vec2<i32>(k % 9, k / 9)) & mask;
-        top = max(top, textureLoad(heights, texel, bake.level, 0).x);
-    }
-    textureStore(fine, vec2<i32>(id.xy), bake.level, vec4<f32>(top, 0.0, 0.0, 0.0));
-    found[index] = top;
-    workgroupBarrier();
-    if index == 0u {
-        for (var k = 1; k < 16; k++) {
-            top = max(top, found[k]);
-        }
-        textureStore(coarse, vec2<i32>(group.xy), bake.level, vec4<f32>(top, 0.0, 0.0, 0.0));
-    }
-}
-#else
-#ifdef CLIP_TOPS
-// The maximum of a level, from those of its blocks of 8 x 8; it stands below those of 32 x 32.
-struct Bake {
-    texels: i32,
-    level: i32,
-}
-
-@group(0) @binding(0) var<uniform> bake: Bake;
-@group(1) @binding(0) var fine: texture_2d_array<f32>;
-@group(2) @binding(0) var coarse: texture_storage_2d_array<r32float, write>;
+@group(1) @binding(1) var places: texture_2d<f32>;
+@group(1) @binding(2) var wrapping: sampler;
+@group(2) @binding(0) var sectors: texture_storage_2d<r32float, write>;
 
 var<workgroup> found: array<f32, 64>;
 
+// One invocation eight rings.
 @compute @workgroup_size(64)
-fn tops(@builtin(local_invocation_index) index: u32) {
-    let side = bake.texels / 8;
-    var top = -1e30;
-    for (var k = i32(index); k < side * side; k += 64) {
-        top = max(top, textureLoad(fine, vec2<i32>(k % side, k / side), bake.level, 0).x);
-    }
-    found[index] = top;
-    workgroupBarrier();
-    if index == 0u {
-        for (var k = 1; k < 64; k++) {
-            top = max(top, found[k]);
+fn sweep(@builtin(local_invocation_index) index: u32, @builtin(workgroup_id) group: vec3<u32>) {
+    let sector = (clip.first_sector + i32(group.x)) & (clip.sectors - 1);
+    let width = 6.28318530718 / f32(clip.sectors);
+    // A little more than the sector, for the rounding of azimuths.
+    let turn = vec2<f32>(f32(sector) - 0.001, f32(sector) + 1.001) * width;
+    let a = vec2<f32>(cos(turn.x), sin(turn.x));
+    let b = vec2<f32>(cos(turn.y), sin(turn.y));
+    // How far the sector's directions reach along their longer axis: least and most at its borders, since 45 and 90 degrees are borders, or nearly.
+    let along = vec2<f32>(max(abs(a.x), abs(a.y)), max(abs(b.x), abs(b.y)));
+    let rounds = (clip.rings + 511) / 512;
+    var whole = -1e30;
+    for (var round = 0; round < rounds; round++) {
+        let begin = (round * 64 + i32(index)) * 8;
+        var eight = -1e30;
+        for (var ring = begin; ring < min(begin + 8, clip.rings); ring++) {
+            let near = ring_radius(clip, ring) * 0.9999;
+            let far = ring_radius(clip, ring + 1) * 1.0001;
+            // Lines through corners this far out do not cut the arc.
+            let out = far * 1.0002;
+            let first = level_of(clip, vec2<f32>(near * min(along.x, along.y) * 0.9998));
+            let last = min(level_of(clip, vec2<f32>(out * max(along.x, along.y))), clip.levels - 1);
+            let low = min(min(a, b) * near, min(a, b) * out);
+            let high = max(max(a, b) * near, max(a, b) * out);
+            var top = -1e30;
+            for (var level = first; level <= last; level++) {
+                let place = textureLoad(places, vec2<i32>(level, 0), 0);
+                let corner = vec2<i32>(floor(place.xy + low * place.z));
+                let count = vec2<i32>(floor(place.xy + high * place.z)) - corner + 2;
+                for (var z = 0; z < count.y; z += 2) {
+                    for (var x = 0; x < count.x; x += 2) {
+                        let h = corners(heights, wrapping, clip, corner + vec2<i32>(x, z), level);
+                        top = max(top, max(max(h.x, h.y), max(h.z, h.w)));
+                    }
+                }
+            }
+            let tangent = select(clearing_tangent(clip.ground_radius, clip.eye_altitude, top, near, far), -1e30, top < -1e29);
+            textureStore(sectors, vec2<i32>(ring, sector), vec4<f32>(tangent, 0.0, 0.0, 0.0));
+            eight = max(eight, tangent);
         }
-        textureStore(coarse, vec2<i32>(0, bake.texels / 32), bake.level, vec4<f32>(top, 0.0, 0.0, 0.0));
+        if begin < clip.rings {
+            textureStore(sectors, vec2<i32>(clip.rings + begin / 8, sector), vec4<f32>(eight, 0.0, 0.0, 0.0));
+        }
+        workgroupBarrier();
+        found[index] = eight;
+        workgroupBarrier();
+        if (index & 7u) == 0u && begin < clip.rings {
+            for (var k = 1u; k < 8u; k++) {
+                eight = max(eight, found[index + k]);
+            }
+            textureStore(sectors, vec2<i32>(clip.rings + clip.rings / 8 + begin / 64, sector), vec4<f32>(eight, 0.0, 0.0, 0.0));
+        }
+        if index == 0u {
+            for (var k = 0u; k < 64u; k++) {
+                whole = max(whole, found[k]);
+            }
+        }
+    }
+    if index == 0u {
+        textureStore(sectors, vec2<i32>(i32(textureDimensions(sectors).x) - 1, sector), vec4<f32>(whole, 0.0, 0.0, 0.0));
     }
 }
 #else
-#ifdef CLIP_HORIZON
-// For each of 64 sectors around the eye, the tangent of an elevation that no baked ground is above. The altitude of a ray over a sphere is at least that over the
-// eye's tangent plane.
-#import veduta::terrain::clipmap::{Clip, level_of}
+#ifdef CLIP_SHADES
+// Heights that the shadows of the sun's upper and lower limb reach on one level: from what they were one texel nearer to the sun. A line that enters the window
+// takes them from the next level.
+#import veduta::terrain::clipmap::{Sweep, shadow_heights}
 
-@group(0) @binding(0) var<uniform> clip: Clip;
-@group(1) @binding(0) var fine: texture_2d_array<f32>;
-@group(1) @binding(1) var places: texture_2d<f32>;
-@group(2) @binding(0) var horizon: texture_storage_2d<r32float, write>;
+struct Shade {
+    // The corner of the window in the texture of heights, and the eye in the window [texels].
+    corner: vec2<i32>,
+    eye: vec2<f32>,
+    // The eye in the window of the next level [texels].
+    next_eye: vec2<f32>,
+    texels: i32,
+    level: i32,
+    // The next level; -1 if there is none.
+    next: i32,
+    spacing: f32,
+    // A structure begins at 16 bytes; naga writes WGSL without alignments.
+    spare: vec2<f32>,
+    sweep: Sweep,
+}
 
-const SECTOR: f32 = 0.09817477042;
+@group(0) @binding(0) var<uniform> shade: Shade;
+@group(1) @binding(0) var heights: texture_2d_array<f32>;
+@group(1) @binding(1) var coarser: texture_2d_array<f32>;
+@group(1) @binding(2) var wrapping: sampler;
+@group(2) @binding(0) var shades: texture_storage_2d_array<rg32float, write>;
 
+// One invocation a line.
 @compute @workgroup_size(64)
-fn skyline(@builtin(local_invocation_index) index: u32) {
-    let turn = vec2<f32>(f32(index), f32(index) + 1.0) * SECTOR;
-    let a = vec2<f32>(cos(turn.x), sin(turn.x));
-    let b = vec2<f32>(cos(turn.y), sin(turn.y));
-    // How far the sector's directions reach along their longer axis: least and most at its borders, since 45 and 90 degrees are borders.
-    let along = vec2<f32>(max(abs(a.x), abs(a.y)), max(abs(b.x), abs(b.y)));
-    let mask = vec2<i32>(clip.texels / 8 - 1);
-    var steepest = -1e30;
-    var near = 0.0;
-    var far = ldexp(8.0 * clip.spacing, clip.first);
-    for (var i = 0; i < 400; i++) {
-        let first = level_of(clip, vec2<f32>(near * min(along.x, along.y)));
-        if first >= clip.levels {
-            break;
-        }
-        // Lines through these corners do not cut the arc.
-        let out = far * 1.0013;
-        let last = min(level_of(clip, vec2<f32>(out * max(along.x, along.y))), clip.levels - 1);
-        let low = min(min(a, b) * near, min(a, b) * out);
-        let high = max(max(a, b) * near, max(a, b) * out);
-        var top = -1e30;
-        for (var level = first; level <= last; level++) {
-            let place = textureLoad(places, vec2<i32>(level, 0), 0);
-            let begin = vec2<i32>(floor((place.xy + low * place.z) * 0.125));
-            let count = vec2<i32>(floor((place.xy + high * place.z) * 0.125)) - begin + 1;
-            for (var z = 0; z < count.y; z++) {
-                for (var x = 0; x < count.x; x++) {
-                    top = max(top, textureLoad(fine, (begin + vec2<i32>(x, z)) & mask, level, 0).x);
-                }
+fn darken(@builtin(global_invocation_id) id: vec3<u32>) {
+    let sweep = shade.sweep;
+    let texels = f32(shade.texels);
+    let stretch = sqrt(1.0 + sweep.shear * sweep.shear);
+    let step = shade.spacing * stretch;
+    let mask = vec2<i32>(shade.texels - 1);
+    let eye = select(shade.eye, shade.eye.yx, sweep.axis == 1);
+    var lap = 1e9;
+    var height = 0.0;
+    var shadow = vec2<f32>(-1e30);
+    for (var i = 0; i < shade.texels; i++) {
+        let along = f32(select(i, shade.texels - 1 - i, sweep.sign > 0.0));
+        // The line comes round: what leaves the window on one side is another line that enters on the other.
+        let line = f32(id.x) + sweep.shear * along;
+        let own_lap = floor(line / texels);
+        let side = line - own_lap * texels;
+        let place = select(vec2<f32>(along, side), vec2<f32>(side, along), sweep.axis == 1);
+        if own_lap != lap {
+            shadow = vec2<f32>(-1e30);
+            if shade.next >= 0 {
+                shadow = shadow_heights(coarser, wrapping, sweep, shade.texels, shade.next_eye + 0.5 * (place - shade.eye), 0);
             }
+            lap = own_lap;
+        } else {
+            // Halfway to the last place, in metres towards the sun from the eye's.
+            let towards = shade.spacing * (sweep.sign * ((along - eye.x) + sweep.shear * (side - eye.y)) / stretch) + 0.5 * step;
+            let bend = sweep.growth * towards;
+            shadow = max(shadow, vec2<f32>(height)) - step * (vec2<f32>(sweep.upper, sweep.lower) + bend);
         }
-        let rise = top - clip.eye_altitude;
-        steepest = max(steepest, rise / max(select(far, near, rise > 0.0), 1e-3));
-        near = far;
-        far *= 1.1;
+        let whole = floor(side);
+        let cell = vec2<i32>(select(vec2<f32>(along, whole), vec2<f32>(whole, along), sweep.axis == 1));
+        let middle = vec2<f32>(((shade.corner + cell) & mask) + 1) / texels;
+        let h = textureGather(0, heights, wrapping, middle, shade.level);
+        height = mix(h.w, select(h.x, h.z, sweep.axis == 1), side - whole);
+        textureStore(shades, vec2<i32>(i32(along), i32(id.x)), 0, vec4<f32>(shadow, 0.0, 0.0));
     }
-    textureStore(horizon, vec2<i32>(i32(index), 0), vec4<f32>(steepest, 0.0, 0.0, 0.0));
 }
 #else
 #import veduta::terrain::field::{Field, ground_at}
@@ -148,7 +175,6 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     let texel = (rectangle.corner + at) & vec2<i32>(rectangle.texels - 1);
     textureStore(heights, texel, rectangle.level, vec4<f32>(ground.height, 0.0, 0.0, 0.0));
 }
-#endif
 #endif
 #endif
     }#

@@ -41,9 +41,9 @@ struct Planet {
 @group(0) @binding(1) var<uniform> clip: Clip;
 @group(1) @binding(0) var<storage, read> rays: array<RayRow>;
 @group(1) @binding(1) var heights: texture_2d_array<f32>;
-@group(1) @binding(2) var fine: texture_2d_array<f32>;
-@group(1) @binding(3) var coarse: texture_2d_array<f32>;
-@group(1) @binding(4) var places: texture_2d<f32>;
+@group(1) @binding(2) var sectors: texture_2d<f32>;
+@group(1) @binding(3) var places: texture_2d<f32>;
+@group(1) @binding(4) var wrapping: sampler;
 #else
 @group(0) @binding(1) var<uniform> planet: Planet;
 @group(1) @binding(0) var<storage, read> rays: array<RayRow>;
@@ -57,7 +57,7 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let ray = rays[id.x];
 #ifdef TERRAIN_FAST
-    let hit = clip_hit(heights, fine, coarse, places, clip, ray.origin, ray.dir, 0.0, ray.far, MAX_MARCHING_STEPS);
+    let hit = clip_hit(heights, wrapping, sectors, places, clip, ray.dir, ray.far, MAX_MARCHING_STEPS);
     let capped = hit.steps == MAX_MARCHING_STEPS && hit.distance < 0.0;
     // A ray that ran out of steps on its way down has almost met it.
     let met = select(hit.distance, hit.reached, capped && hit.clearance < 0.05 * hit.reached);

@@ -1,15 +1,14 @@
-//! Rays over baked heights: nested levels around the eye, each with the maxima of its blocks.
+//! Rays over baked heights: nested levels around the eye, and how high their ground stands all around it.
 //!
 //! Level l has texels of `spacing` 2^l metres, heights at their lower corners; it serves places whose larger coordinate is within `reach` texels of the
-//! eye, and is addressed modulo its size, so that texels stay where they are when the eye moves. A ray first leaves whole levels that lie below it, then a block of 32, of 8 or of 1 texel at a time:
-//! the largest whose maximum lies below the ray's altitude on its way through, of which the tangent is a lower bound, since altitude over a sphere is
-//! convex. In a single texel the patch between its corners is bilinear.
+//! eye, and is addressed modulo its size, so that texels stay where they are when the eye moves. Around the eye the ground is divided into sectors of azimuth and
+//! into rings, which widen with the distance. A ray from the eye stays in one sector, and its elevation is all that has to be compared with what each ring of it
+//! holds: the tangent that clears its ground. Rings go by 64, 8 and one at a time; only in a ring that a ray may meet does it go from texel to texel, where the
+//! patch between the corners is bilinear.
 //!
-//! source   Tevs2008 (maximum mipmaps); Losasso2004 (clipmaps); the tangent's bound: ours
-//! symbols  t distance along the ray [m] · origin its start relative to the eye [m] · level of the clipmap [1]
+//! source   Tevs2008 (maxima of many sizes); Losasso2004 (clipmaps); sectors and rings: ours
+//! symbols  t distance along the ray [m] · level of the clipmap [1] · ring, sector around the eye [1]
 #define_import_path veduta::terrain::clipmap
-
-#import veduta::planet::shell::{up_at, altitude_of}
 
 /// What the rays need to know of the levels.
 struct Clip {
@@ -29,6 +28,16 @@ struct Clip {
     first: i32,
     /// Levels.
     levels: i32,
+    /// Rings around the eye, a multiple of 64.
+    rings: i32,
+    /// Sectors around the eye, a power of two; sector 0 begins at +x.
+    sectors: i32,
+    /// The first sector that has been made, and how many.
+    first_sector: i32,
+    made_sectors: i32,
+    /// Ring k begins at `ring_scale` sinh(`ring_growth` k) from the eye's axis [m].
+    ring_scale: f32,
+    ring_growth: f32,
 }
 
 /// What a ray found.
@@ -54,19 +63,12 @@ fn level_of(clip: Clip, at: vec2<f32>) -> i32 {
     return max((bitcast<i32>(far) >> 23u) - 126, clip.first);
 }
 
-/// The heights at the corners of a texel: lower, next in x, next in z, opposite.
+/// The heights at the corners of a texel: lower, next in x, next in z, opposite. `wrapping` is a sampler that repeats; it reads all four at once.
 ///
 /// internal
-fn corners(heights: texture_2d_array<f32>, clip: Clip, cell: vec2<i32>, level: i32) -> vec4<f32> {
-    let mask = vec2<i32>(clip.texels - 1);
-    let low = cell & mask;
-    let high = (cell + 1) & mask;
-    return vec4<f32>(
-        textureLoad(heights, low, level, 0).x,
-        textureLoad(heights, vec2<i32>(high.x, low.y), level, 0).x,
-        textureLoad(heights, vec2<i32>(low.x, high.y), level, 0).x,
-        textureLoad(heights, high, level, 0).x,
-    );
+fn corners(heights: texture_2d_array<f32>, wrapping: sampler, clip: Clip, cell: vec2<i32>, level: i32) -> vec4<f32> {
+    let middle = vec2<f32>((cell & vec2<i32>(clip.texels - 1)) + 1) / f32(clip.texels);
+    return textureGather(0, heights, wrapping, middle, level).wzxy;
 }
 
 /// The bilinear patch at a fraction of the texel.
@@ -86,110 +88,101 @@ fn patch_height(h: vec4<f32>, f: vec2<f32>) -> f32 {
 /// error   1 abs of reference::field::ground
 /// outside undefined
 /// source  Losasso2004
-fn baked_height(heights: texture_2d_array<f32>, places: texture_2d<f32>, clip: Clip, at: vec2<f32>, least: i32) -> f32 {
+fn baked_height(heights: texture_2d_array<f32>, wrapping: sampler, places: texture_2d<f32>, clip: Clip, at: vec2<f32>, least: i32) -> f32 {
     let level = min(max(level_of(clip, at), least), clip.levels - 1);
     let place = textureLoad(places, vec2<i32>(level, 0), 0);
     let u = place.xy + at * place.z;
     let whole = floor(u);
-    return patch_height(corners(heights, clip, vec2<i32>(whole), level), u - whole);
+    return patch_height(corners(heights, wrapping, clip, vec2<i32>(whole), level), u - whole);
 }
 
-/// First place where a ray from `origin` meets the baked ground between `near` and `far`. A ray that uses up `max_steps` has no hit, but tells how
-/// far it came. Below the maxima of blocks of 32 in `coarse` stands that of the level. Rays that rise above the highest of the heights end there.
+/// Distance of the inner border of a ring from the eye's axis.
 ///
-/// domain  origin in [-1e6, 1e6] m lin
+/// internal
+fn ring_radius(clip: Clip, ring: i32) -> f32 {
+    let x = clip.ring_growth * f32(ring);
+    return 0.5 * clip.ring_scale * (exp(x) - exp(-x));
+}
+
+/// Tangent of the elevation of the lowest ray from the eye that passes above ground of height `top` everywhere between the distances `near` and `far` from the
+/// eye's axis. Rounding is on the safe side.
+///
+/// internal
+fn clearing_tangent(ground_radius: f32, eye_altitude: f32, top: f32, near: f32, far: f32) -> f32 {
+    let radius = ground_radius + eye_altitude;
+    let rise = top - eye_altitude;
+    let b = rise * (2.0 * radius + rise);
+    // From above, ground of one height looks highest at its horizon.
+    let r = max(clamp(sqrt(max(-b, 0.0)), near, max(near, far)), 1e-3);
+    let tangent = (b - r * r) / (r * (radius + sqrt(max(radius * radius + b - r * r, 0.0))));
+    return tangent + 1e-6 + 1e-5 * abs(tangent);
+}
+
+/// First place where a ray from the eye meets the baked ground before `far`. A ray that uses up `max_steps` has no hit, but tells how far it came. `sectors`
+/// holds, for each sector of azimuth, the tangents that clear the ground of its rings; see `veduta::terrain_bake`.
+///
 /// domain  dir in [-1, 1] 1 lin
-/// domain  near in [0, 1e6] m lin
 /// domain  far in [0, 1e6] m lin
 /// domain  max_steps in [0, 10000] 1 lin
 /// range   [-1e6, 1e6] m
 /// error   1 abs of reference::intersect::first_crossing
 /// outside undefined
-/// source  Tevs2008; departs: clipmap, blocks of four sizes, tangents for altitudes
-fn clip_hit(heights: texture_2d_array<f32>, fine: texture_2d_array<f32>, coarse: texture_2d_array<f32>, places: texture_2d<f32>, clip: Clip,
-    origin: vec3<f32>, dir: vec3<f32>, near: f32, far: f32, max_steps: i32) -> ClipHit {
-    var hit = ClipHit(-1.0, near, 0.0, clip.spacing, 0);
-    let start = altitude_of(clip.ground_radius, clip.eye_altitude, origin);
-    let mu = dot(dir, up_at(clip.ground_radius, clip.eye_altitude, origin));
+/// source  Tevs2008 (maxima of many sizes); departs: maxima of elevations, by sector and ring
+fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_2d<f32>, places: texture_2d<f32>, clip: Clip, dir: vec3<f32>, far: f32, max_steps: i32) -> ClipHit {
+    var hit = ClipHit(-1.0, 0.0, 0.0, clip.spacing, 0);
+    let start = clip.eye_altitude;
     let radius = clip.ground_radius + start;
     let flat = select(dir.xz, vec2<f32>(1e-6), abs(dir.xz) < vec2<f32>(1e-6));
     let inverse = 1.0 / flat;
     let side = select(vec2<f32>(0.0), vec2<f32>(1.0), flat > vec2<f32>(0.0));
-    let fine_mask = vec2<i32>(clip.texels / 8 - 1);
-    let coarse_mask = vec2<i32>(clip.texels / 32 - 1);
-    var t = near;
-    // Levels that lie below the ray as far as they serve it.
-    for (var i = 0; i < clip.levels; i++) {
-        let q = t * (t + 2.0 * radius * mu);
-        let root = sqrt(max(radius * radius + q, 0.0));
-        let altitude = start + q / (radius + root);
-        let rise = (radius * mu + t) / root;
-        let at = origin.xz + dir.xz * t;
-        let level = level_of(clip, at);
-        let spacing = textureLoad(places, vec2<i32>(level, 0), 0).w;
-        let leave = ((2.0 * side - 1.0) * clip.reach * spacing - at) * inverse + abs(inverse) * spacing * 1e-3;
-        let step = min(leave.x, leave.y);
-        if level >= clip.levels || altitude + min(rise * step, 0.0) <= textureLoad(coarse, vec2<i32>(0, clip.texels / 32), level, 0).x {
-            break;
-        }
-        t += step;
-    }
-    hit.reached = t;
+    let outwards = 1.0 / max(length(dir.xz), 1e-6);
+    let tangent = dir.y * outwards;
+    let sector = i32(floor(atan2(dir.z, dir.x) * (0.15915494309 * f32(clip.sectors)))) & (clip.sectors - 1);
+    var ring = 0;
+    var t = 0.0;
     var done = false;
     while hit.steps < max_steps && !done {
-        // Blocks of 32 and of 8 texels, up to one of 8 that may be met.
-        var level = 0;
-        var place = vec4<f32>(0.0);
-        var end = 0.0;
+        // Rings above whose ground the ray passes: 64, 8 or one at a time.
+        var size = 2u;
         while hit.steps < max_steps {
-            let q = t * (t + 2.0 * radius * mu);
-            let root = sqrt(max(radius * radius + q, 0.0));
-            let altitude = start + q / (radius + root);
-            let rise = (radius * mu + t) / root;
-            let at = origin.xz + dir.xz * t;
-            level = level_of(clip, at);
-            if t >= far || level >= clip.levels || (rise >= 0.0 && altitude > clip.top) {
+            if ring >= clip.rings {
                 done = true;
                 break;
             }
             hit.steps += 1;
-            place = textureLoad(places, vec2<i32>(level, 0), 0);
-            let u = place.xy + at * place.z;
-            let cell = vec2<i32>(floor(u));
-            // Ways to the borders of the blocks, and a thousandth of a texel beyond.
-            let stretch = inverse * place.w;
-            let leave = abs(stretch) * 1e-3;
-            let to_coarse = ((floor(u * 0.03125) + side) * 32.0 - u) * stretch + leave;
-            let to_fine = ((floor(u * 0.125) + side) * 8.0 - u) * stretch + leave;
-            let step_coarse = min(to_coarse.x, to_coarse.y);
-            let step_fine = min(to_fine.x, to_fine.y);
-            let over_coarse = textureLoad(coarse, (cell >> vec2<u32>(5u)) & coarse_mask, level, 0).x;
-            let over_fine = textureLoad(fine, (cell >> vec2<u32>(3u)) & fine_mask, level, 0).x;
-            let clear_coarse = altitude + min(rise * step_coarse, 0.0) > over_coarse;
-            if !clear_coarse && altitude + min(rise * step_fine, 0.0) <= over_fine {
-                end = t + step_fine;
-                break;
+            let column = select(select(0, clip.rings, size == 1u), clip.rings + (clip.rings >> 3u), size == 2u);
+            let top = textureLoad(sectors, vec2<i32>(column + (ring >> (3u * size)), sector), 0).x;
+            if tangent > top {
+                ring = ((ring >> (3u * size)) + 1) << (3u * size);
+                size = select(select(0u, 1u, (ring & 7) == 0), 2u, (ring & 63) == 0);
+            } else {
+                if size == 0u {
+                    break;
+                }
+                size -= 1u;
             }
-            hit.reached = t;
-            hit.clearance = altitude - over_fine;
-            t += select(step_fine, step_coarse, clear_coarse);
         }
-        // Its texels, while its level serves them.
+        // The texels of the ring, while one level serves them.
+        t = max(t, ring_radius(clip, ring) * outwards);
+        let end = select(ring_radius(clip, ring + 1) * outwards, 0.0, done);
+        done = done || t >= far;
+        let level = level_of(clip, dir.xz * t);
+        let place = textureLoad(places, vec2<i32>(min(level, clip.levels - 1), 0), 0);
         while hit.steps < max_steps && !done && t < end {
-            let q = t * (t + 2.0 * radius * mu);
-            let root = sqrt(max(radius * radius + q, 0.0));
-            let altitude = start + q / (radius + root);
-            let rise = (radius * mu + t) / root;
-            let at = origin.xz + dir.xz * t;
+            let at = dir.xz * t;
             if level_of(clip, at) != level {
                 break;
             }
+            let q = t * (t + 2.0 * radius * dir.y);
+            let root = sqrt(max(radius * radius + q, 0.0));
+            let altitude = start + q / (radius + root);
+            let rise = (radius * dir.y + t) / root;
             let u = place.xy + at * place.z;
             let whole = floor(u);
             let stretch = inverse * place.w;
             let to_texel = (whole + side - u) * stretch + abs(stretch) * 1e-3;
             let step = min(to_texel.x, to_texel.y);
-            let h = corners(heights, clip, vec2<i32>(whole), level);
+            let h = corners(heights, wrapping, clip, vec2<i32>(whole), min(level, clip.levels - 1));
             let here = altitude - patch_height(h, u - whole);
             let there = altitude + rise * step - patch_height(h, clamp(u - whole + flat * place.z * step, vec2<f32>(0.0), vec2<f32>(1.0)));
             hit.reached = t;
@@ -203,48 +196,67 @@ fn clip_hit(heights: texture_2d_array<f32>, fine: texture_2d_array<f32>, coarse:
             }
             t += step;
         }
+        ring += select(0, 1, t >= end);
     }
     return hit;
 }
 
-/// Share of the disc of a light of the angular radius whose tangent is `width` that is seen past the baked ground from `origin`. On the way details
-/// much finer than the penumbra are left to coarser levels.
+/// How the ground's shadow is swept: along the axis of the texels nearest to the sun's azimuth, on lines that keep to it.
+struct Sweep {
+    /// Axis: 0 for x, 1 for z; the other is the side.
+    axis: i32,
+    /// Side steps a step along the axis [1].
+    shear: f32,
+    /// Tangents of the elevation of the upper and the lower limb, at the eye.
+    upper: f32,
+    lower: f32,
+    /// By how much they grow towards the sun [1/m].
+    growth: f32,
+    /// Sun on the axis: 1 or -1.
+    sign: f32,
+}
+
+/// The line through a place in texels from a window's corner, along the axis and to the side.
 ///
-/// domain  origin in [-1e6, 1e6] m lin
-/// domain  to_light in [-1, 1] 1 lin
-/// domain  width in [1e-4, 0.1] 1 log
-/// domain  lift in [0, 1e4] m lin
-/// domain  far in [0, 1e6] m lin
-/// domain  max_steps in [0, 10000] 1 lin
+/// internal
+fn sweep_line(sweep: Sweep, place: vec2<f32>) -> vec2<f32> {
+    let along = select(place, place.yx, sweep.axis == 1);
+    return vec2<f32>(along.x, along.y - sweep.shear * along.x);
+}
+
+/// Heights that the shadows of the upper and of the lower limb reach at a place: between four points of two lines.
+///
+/// internal
+fn shadow_heights(shades: texture_2d_array<f32>, wrapping: sampler, sweep: Sweep, texels: i32, place: vec2<f32>, level: i32) -> vec2<f32> {
+    let line = sweep_line(sweep, place);
+    let whole = floor(line);
+    let middle = vec2<f32>((vec2<i32>(whole) & vec2<i32>(texels - 1)) + 1) / f32(texels);
+    let f = line - whole;
+    return vec2<f32>(
+        patch_height(textureGather(0, shades, wrapping, middle, level).wzxy, f),
+        patch_height(textureGather(1, shades, wrapping, middle, level).wzxy, f),
+    );
+}
+
+/// Share of the sun's disc that is seen past the baked ground from a place on it, given relative to the eye. `shades` holds the heights to which the shadows of
+/// the sun's upper and lower limb reach.
+///
+/// domain  at in [-1e6, 1e6] m lin
 /// range   [0, 1] 1
 /// error   1 abs of reference::terrain::soft_shadow
-/// source  Quilez2010 (least ratio of clearance to distance); the levels and the disc: ours
-fn clip_shadow(heights: texture_2d_array<f32>, places: texture_2d<f32>, clip: Clip, origin: vec3<f32>, to_light: vec3<f32>, width: f32, lift: f32, far: f32,
-    max_steps: i32) -> f32 {
-    let start = altitude_of(clip.ground_radius, clip.eye_altitude, origin) + lift;
-    let mu = dot(to_light, up_at(clip.ground_radius, clip.eye_altitude, origin));
-    let radius = clip.ground_radius + start;
-    var least = 1.0;
-    var t = 2.0 * lift;
-    for (var i = 0; i < max_steps; i++) {
-        let q = t * (t + 2.0 * radius * mu);
-        let root = sqrt(max(radius * radius + q, 0.0));
-        let altitude = start + q / (radius + root);
-        let rise = (radius * mu + t) / root;
-        if t >= far || least <= -1.0 || (rise >= 0.0 && altitude > clip.top) {
-            break;
-        }
-        let at = origin.xz + to_light.xz * t;
-        // A texel of half the penumbra's half width.
-        let own = (bitcast<i32>(0.5 * width * t / clip.spacing) >> 23u) - 126;
-        let level = min(max(level_of(clip, at), own), clip.levels - 1);
-        let place = textureLoad(places, vec2<i32>(level, 0), 0);
-        let u = place.xy + at * place.z;
-        let whole = floor(u);
-        let clearance = altitude - patch_height(corners(heights, clip, vec2<i32>(whole), level), u - whole);
-        least = min(least, clearance / (width * t));
-        t += max(0.7 * clearance, max(place.w, 0.03 * t));
-    }
-    let x = clamp(least, -1.0, 1.0);
+/// outside undefined
+/// source  ours: running maxima of heights along lines towards the sun
+fn sun_share(heights: texture_2d_array<f32>, shades: texture_2d_array<f32>, wrapping: sampler, places: texture_2d<f32>, clip: Clip, sweep: Sweep, at: vec2<f32>) -> f32 {
+    let level = min(level_of(clip, at), clip.levels - 1);
+    let place = textureLoad(places, vec2<i32>(level, 0), 0);
+    let u = place.xy + at * place.z;
+    let whole = floor(u);
+    let height = patch_height(corners(heights, wrapping, clip, vec2<i32>(whole), level), u - whole);
+    let window = textureLoad(places, vec2<i32>(level, 1), 0).xy + at * place.z;
+    let shadow = shadow_heights(shades, wrapping, sweep, clip.texels, window, level);
+    // What is finer than a texel is not resolved.
+    let texel = 0.25 * place.w * abs(sweep.upper);
+    let half = max(0.5 * (shadow.y - shadow.x), texel) + 1e-6;
+    let x = clamp((height - 0.5 * (shadow.x + shadow.y)) / half, -1.0, 1.0);
     return clamp(0.5 + x * (0.75 - 0.25 * x * x), 0.0, 1.0);
 }

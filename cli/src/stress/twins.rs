@@ -61,7 +61,7 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "rays_over_baked_heights_meet_the_field",
     ),
     (
-        "veduta::terrain::clipmap::clip_shadow",
+        "veduta::terrain::clipmap::sun_share",
         "the_sun_shines_where_the_ground_lets_it",
     ),
     (

@@ -109,7 +109,10 @@ fn reflection_is_complete() {
                 1,
                 3,
                 "smooth_sampler",
-                BindingType::Sampler { comparison: false },
+                BindingType::Sampler {
+                    comparison: false,
+                    filtering: true
+                },
                 fragment
             ),
         ]

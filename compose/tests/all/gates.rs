@@ -303,3 +303,47 @@ fn many_ways_through_the_imports() {
         2 * (levels - 1) + 1 + 2 - 1 + 1
     );
 }
+
+/// A sampler with which a program only gathers need not filter, nor the texture be filterable, through however many calls.
+#[test]
+fn gathers_do_not_filter() {
+    use veduta_compose::reflect::{BindingType, SampleType};
+    let modules = [(
+        "m.wgsl",
+        "#define_import_path t::m\nfn inner(t: texture_2d<f32>, s: sampler, at: vec2f) -> f32 { return textureGather(0, t, s, at).x; }\n\
+         fn gathered(t: texture_2d<f32>, s: sampler, at: vec2f) -> f32 { var sum = 0.0; loop { sum += inner(t, s, at); if sum > 1.0 { break; } } return sum; }\n\
+         fn sampled(t: texture_2d<f32>, s: sampler, at: vec2f) -> f32 { if at.x > 0.0 { return textureSampleLevel(t, s, at, 0.0).x; } return 0.0; }\n",
+    )];
+    let bindings = |call: &str| {
+        let name = &call[..call.find('(').unwrap()];
+        let body = format!(
+            "#import t::m::{{{name}}}\n@group(1) @binding(0) var t: texture_2d<f32>;\n@group(1) @binding(1) var s: sampler;\nfn value(k: u32) -> f32 {{ return {call}; }}"
+        );
+        let composed = compose(&modules, &compute(&body), Capabilities::empty(), &[]);
+        let composed = composed.unwrap_or_else(|diags| panic!("{diags}"));
+        let of = |name: &str| {
+            composed
+                .bindings
+                .iter()
+                .find(|b| b.name == name)
+                .unwrap()
+                .ty
+        };
+        (of("t"), of("s"))
+    };
+    for (call, filters) in [
+        ("gathered(t, s, vec2f(f32(k)))", false),
+        ("sampled(t, s, vec2f(f32(k)))", true),
+    ] {
+        let (texture, sampler) = bindings(call);
+        assert!(
+            matches!(texture, BindingType::Texture { sample: SampleType::Float { filterable }, .. } if filterable == filters),
+            "{call}: {texture:?}"
+        );
+        let expected = BindingType::Sampler {
+            comparison: false,
+            filtering: filters,
+        };
+        assert_eq!(sampler, expected, "{call}");
+    }
+}
