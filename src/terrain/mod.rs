@@ -5,6 +5,8 @@ mod calibrate;
 mod clipmap;
 mod field;
 mod ground;
+#[cfg(feature = "reference")]
+mod judge;
 mod land;
 mod noise;
 mod probe;
@@ -16,6 +18,8 @@ pub use calibrate::{Tail, Tails};
 pub use clipmap::{Clipmap, ClipmapOptions};
 pub use field::{Bounds, Domain, HeightField, Kind};
 pub use ground::{Ground, Prepared};
+#[cfg(feature = "reference")]
+pub use judge::{HitErrors, hit_errors};
 pub use land::{Land, Material};
 pub use noise::Place;
 pub use probe::heights;

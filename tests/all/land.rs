@@ -1,8 +1,7 @@
 //! Rays over baked heights, shadows, and the ground in a host's pass.
 
 use veduta::WorldPos;
-use veduta::reference::parallel::parallel_map;
-use veduta::terrain::{Land, RayPath, TerrainRay, ray_hits};
+use veduta::terrain::{Land, RayPath, TerrainRay, hit_errors, ray_hits};
 use veduta::view::direction;
 
 use crate::common::gpu;
@@ -65,75 +64,30 @@ fn rays_over_baked_heights_meet_the_field() {
             RayPath::Fast,
         )
         .unwrap();
-        let field = land.field.prepare::<f64>().unwrap();
-        let top = land.field.bounds().unwrap().maximum;
-        let truth = parallel_map(rays.len(), |i| {
-            field
-                .ray_hit(land.planet_radius, top, &rays[i], f64::from(angle), 0.05)
-                .unwrap()
-        });
-        // A pixel is next to the silhouette when one of its neighbours sees the other side of it.
-        let met = |i: usize| truth[i].distance.is_finite();
-        let near_edge = |i: usize| {
-            let (x, y) = (i % columns, i / columns);
-            (-1..=1_i32).any(|dy| {
-                (-1..=1_i32).any(|dx| {
-                    let (x, y) = (x as i32 + dx, y as i32 + dy);
-                    x >= 0
-                        && y >= 0
-                        && x < columns as i32
-                        && y < rows as i32
-                        && met(y as usize * columns + x as usize) != met(i)
-                })
-            })
-        };
-        let (mut wrong, mut at_edge, mut capped) = (0, 0, 0);
-        let mut errors = Vec::new();
-        for (i, (f, t)) in found.iter().zip(&truth).enumerate() {
-            capped += i32::from(f.capped);
-            match (f.distance.is_finite(), t.distance.is_finite()) {
-                (true, true) => {
-                    // Across the ray: how far it stays above the field where it should not have ended, or how deep it dips where it should have.
-                    let (near, far) = (f.distance.min(t.distance), f.distance.max(t.distance));
-                    let eye = field.place(rays[i].origin);
-                    let radius = land.planet_radius + rays[i].origin.altitude();
-                    let gap = |at: f64| {
-                        let [x, y, z] = rays[i].dir.map(|c| c * at);
-                        let altitude =
-                            (x * x + (y + radius).powi(2) + z * z).sqrt() - land.planet_radius;
-                        let g = field.ground_from(eye, [x, z], f64::from(angle) * at);
-                        (altitude - g.height) * g.normal()[1]
-                    };
-                    let across = if f.distance < t.distance {
-                        gap(near)
-                    } else {
-                        (0..=64)
-                            .map(|k| -gap(near + (far - near) * f64::from(k) / 64.0))
-                            .fold(0.0, f64::max)
-                    };
-                    errors.push(across.abs() / (f64::from(angle) * t.distance).max(0.05));
-                }
-                (false, false) => {}
-                _ if near_edge(i) => at_edge += 1,
-                _ => wrong += 1,
-            }
-        }
-        errors.sort_by(f64::total_cmp);
-        let centile = |share: f64| errors[((errors.len() - 1) as f64 * share) as usize];
+        let errors = hit_errors(&land, &rays, columns, f64::from(angle), &found).unwrap();
         let count = rays.len() as f64;
         println!(
-            "{name}, {height} m: {} hits of {count}; wrong {:.3} %, at the silhouette {:.3} %, capped {capped}; error in footprints: median {:.3}, 95 % {:.3}, 99 % {:.3}",
-            errors.len(),
-            100.0 * f64::from(wrong) / count,
-            100.0 * f64::from(at_edge) / count,
-            centile(0.5),
-            centile(0.95),
-            centile(0.99)
+            "{name}, {height} m: {} hits of {count}; wrong {:.3} %, at the silhouette {:.3} %, capped {}; error in footprints: median {:.3}, 95 % {:.3}, 99 % {:.3}",
+            errors.across.len(),
+            100.0 * errors.wrong as f64 / count,
+            100.0 * errors.at_silhouette as f64 / count,
+            errors.capped,
+            errors.centile(0.5),
+            errors.centile(0.95),
+            errors.centile(0.99)
         );
-        assert!(f64::from(wrong) <= 2e-4 * count, "{name}: {wrong}");
-        assert!(f64::from(at_edge) <= 3e-3 * count, "{name}: {at_edge}");
-        assert!(centile(0.99) <= 0.5, "{name}");
-        assert_eq!(capped, 0, "{name}");
+        assert!(
+            errors.wrong as f64 <= 2e-4 * count,
+            "{name}: {}",
+            errors.wrong
+        );
+        assert!(
+            errors.at_silhouette as f64 <= 3e-3 * count,
+            "{name}: {}",
+            errors.at_silhouette
+        );
+        assert!(errors.centile(0.99) <= 0.5, "{name}");
+        assert_eq!(errors.capped, 0, "{name}");
     }
 }
 

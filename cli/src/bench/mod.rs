@@ -7,6 +7,7 @@ pub mod noise;
 pub mod plot;
 pub mod presets;
 pub mod sky;
+pub mod terrain;
 pub mod timing;
 pub mod truth;
 

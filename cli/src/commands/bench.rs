@@ -6,7 +6,7 @@ use indicatif::ProgressBar;
 
 use crate::bench::knob::{self, Effect, Knob};
 use crate::bench::timing::{Clock, Rounds};
-use crate::bench::{Bench, baseline, chapter6, noise, presets, sky, write_text};
+use crate::bench::{Bench, baseline, chapter6, noise, presets, sky, terrain, write_text};
 use crate::catalog::{Catalog, SourceArgs};
 use crate::commands::render::{RenderArgs, read_json, write_json};
 use crate::error::CliError;
@@ -28,6 +28,8 @@ pub enum Subject {
     Noise,
     /// Tables and draws of the sky, against marches without tables.
     Sky,
+    /// The terrain against that of the preset `thesis`.
+    Terrain,
 }
 
 /// Arguments of `veduta bench`.
@@ -158,7 +160,8 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 | Subject::Chapter6
                 | Subject::Baseline
                 | Subject::Noise
-                | Subject::Sky,
+                | Subject::Sky
+                | Subject::Terrain,
             ),
             Some(knob),
         ) => {
@@ -170,14 +173,17 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
         }
         (subject, _) => subject.unwrap_or(Subject::Presets),
     };
+    const VIEWS: [&str; 12] = [
+        "V01", "V02", "V03", "V04", "V05", "V06", "V07", "V08", "V09", "V10", "V11", "V12",
+    ];
     let others = |allowed: &[Subject]| !allowed.contains(&subject);
     for (name, given, wrong, allowed) in [
         (
             "--views",
             as_given(&args.views),
-            others(&[Subject::Presets, Subject::Knob])
+            others(&[Subject::Presets, Subject::Knob, Subject::Terrain])
                 || (subject == Subject::Knob && args.views.len() > 1),
-            "left out, or the subject `presets`, or one view of a knob",
+            "left out, or the subject `presets` or `terrain`, or one view of a knob",
         ),
         (
             "--of",
@@ -256,13 +262,7 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
             let plan = presets::Plan {
                 scene: "thesis".to_owned(),
                 presets: or_usual(&args.presets, &["thesis_low", "low", "medium", "high"]),
-                views: or_usual(
-                    &args.views,
-                    &[
-                        "V01", "V02", "V03", "V04", "V05", "V06", "V07", "V08", "V09", "V10",
-                        "V11", "V12",
-                    ],
-                ),
+                views: or_usual(&args.views, &VIEWS),
                 reference: "reference".to_owned(),
                 samples: 4,
                 rounds,
@@ -314,6 +314,24 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 write_json(
                     &path.with_extension("json"),
                     &sky::to_json(&bench, &report, &command),
+                )?;
+            }
+        }
+        Subject::Terrain => {
+            let plan = terrain::Plan {
+                views: or_usual(&args.views, &VIEWS),
+                rounds: rounds.least,
+                frames: if args.views.is_empty() { 60 } else { 0 },
+            };
+            let report = terrain::run(&bench, &plan, &mut progress)?;
+            bar.finish_and_clear();
+            let text = terrain::markdown(&bench, &report, &command);
+            print!("{text}");
+            if let Some(path) = &args.out {
+                write_text(path, &text)?;
+                write_json(
+                    &path.with_extension("json"),
+                    &terrain::to_json(&bench, &report, &command),
                 )?;
             }
         }

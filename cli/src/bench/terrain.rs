@@ -1,0 +1,621 @@
+//! What the terrain costs and how far it is off, beside that of the preset `thesis`, on the frozen views.
+
+use serde_json::json;
+use veduta::glam::Vec3;
+use veduta::terrain::{
+    HitErrors, Land, RayPath, Terrain, TerrainLights, TerrainOptions, TerrainRay, hit_errors,
+    ray_hits,
+};
+use veduta::view::direction;
+use veduta::{Preset, Targets, Value, View, wgpu};
+
+use super::timing::{Middle, Ratio};
+use super::{Bench, table};
+use crate::commands::render::Job;
+use crate::cpu::CpuTime;
+use crate::error::CliError;
+use crate::metrics::{Picture, psnr};
+use crate::render::{Output, Renderer, Size, Tiling, picture};
+
+/// The presets that are measured beside `thesis`.
+pub const PRESETS: [&str; 2] = ["high", "low"];
+
+/// Samples a pixel of converged pictures, in each direction.
+const SAMPLES: u32 = 8;
+
+/// Speed of the flight [m/s], and its frames a second.
+const FLIGHT: (f64, f64) = (100.0, 30.0);
+
+/// What is measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// The views.
+    pub views: Vec<String>,
+    /// Rounds of timing.
+    pub rounds: usize,
+    /// Frames of the flight in which changes are compared; 0 leaves it out.
+    pub frames: usize,
+}
+
+/// Of one preset on one view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Milliseconds of a draw, by round.
+    pub draws: Vec<f64>,
+    /// The first bake [ms].
+    pub first_bake: f64,
+    /// Bakes in a flight, by frame [ms].
+    pub bakes: Vec<f64>,
+    /// Draws in that flight [ms].
+    pub flown: Vec<f64>,
+    /// Against its own converged picture [dB].
+    pub psnr: f64,
+}
+
+/// Of one view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// Its name.
+    pub view: String,
+    /// Share of the picture that is ground.
+    pub ground: f64,
+    /// Milliseconds of the preset `thesis`, by round.
+    pub thesis: Vec<f64>,
+    /// `thesis` against its own converged picture [dB].
+    pub thesis_psnr: f64,
+    /// The presets.
+    pub presets: Vec<Entry>,
+    /// Hits of `high` against bracketing.
+    pub hits: HitErrors,
+}
+
+/// Changes from frame to frame that motion does not explain: of thesis and of the presets, in 8-bit steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flicker {
+    /// Of `thesis`.
+    pub thesis: f64,
+    /// Of each preset.
+    pub presets: Vec<f64>,
+}
+
+/// What was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// The views.
+    pub lines: Vec<Line>,
+    /// The flight.
+    pub flicker: Option<Flicker>,
+    /// Bytes on the device of each preset.
+    pub bytes: Vec<u64>,
+}
+
+/// A terrain with what it is drawn into.
+struct Drawer {
+    terrain: Terrain,
+    color: wgpu::Texture,
+    depth: wgpu::TextureView,
+    size: Size,
+}
+
+impl Drawer {
+    fn new(bench: &Bench, preset: &str, size: Size, texels: u32) -> Result<Drawer, CliError> {
+        let device = &bench.gpu.device;
+        let format = wgpu::TextureFormat::Rgba32Float;
+        let targets = Targets {
+            color_format: format,
+            depth_format: Some(wgpu::TextureFormat::Depth32Float),
+            ..Default::default()
+        };
+        let options = TerrainOptions {
+            preset: Preset::Named(preset.to_owned().into()),
+            land: Land::named("thesis")?,
+            far: 100_000.0,
+            texels,
+        };
+        let depth = device
+            .create_texture(&wgpu::TextureDescriptor {
+                label: Some("depth"),
+                size: wgpu::Extent3d {
+                    width: size.width,
+                    height: size.height,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Depth32Float,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+                view_formats: &[],
+            })
+            .create_view(&Default::default());
+        Ok(Drawer {
+            terrain: Terrain::new(device, veduta::programs(), &targets, &options)?,
+            color: picture(device, size, format),
+            depth,
+            size,
+        })
+    }
+
+    fn submit(bench: &Bench, encoder: wgpu::CommandEncoder) -> Result<f64, CliError> {
+        let before = CpuTime::now();
+        bench.gpu.queue.submit([encoder.finish()]);
+        bench
+            .gpu
+            .device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|e| veduta::Error::Device(e.to_string()))?;
+        match (before, CpuTime::now()) {
+            (Some(before), Some(after)) => Ok(after.since(&before)),
+            _ => Err(CliError::argument(
+                "--clock",
+                "cpu",
+                "processor time, which this system does not tell",
+            )),
+        }
+    }
+
+    /// Milliseconds of baking and of drawing.
+    fn frame(&mut self, bench: &Bench, view: &View) -> Result<[f64; 2], CliError> {
+        let (device, queue) = (&bench.gpu.device, &bench.gpu.queue);
+        let lights = TerrainLights::clear(view.sun.irradiance);
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let _ = self
+            .terrain
+            .prepare(queue, &mut encoder, view, &lights, self.size.height)?;
+        let baked = Drawer::submit(bench, encoder)?;
+        let mut encoder = device.create_command_encoder(&Default::default());
+        {
+            let target = self.color.create_view(&Default::default());
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &target,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: Default::default(),
+                })],
+                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                    view: &self.depth,
+                    depth_ops: Some(wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(0.0),
+                        store: wgpu::StoreOp::Store,
+                    }),
+                    stencil_ops: None,
+                }),
+                ..Default::default()
+            });
+            let _ = self.terrain.draw_opaque(&mut pass);
+        }
+        Ok([baked, Drawer::submit(bench, encoder)?])
+    }
+
+    /// The picture drawn last: radiance, and the share of it that is ground.
+    fn read(&self, bench: &Bench) -> Result<(Picture, f64), CliError> {
+        let bytes = bench.gpu.read_texture(&self.color)?;
+        let numbers: Vec<f32> = bytes
+            .chunks_exact(4)
+            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            .collect();
+        let ground = numbers.chunks_exact(4).filter(|p| p[3] > 0.0).count();
+        let rgb = numbers
+            .chunks_exact(4)
+            .flat_map(|p| [p[0], p[1], p[2]])
+            .collect();
+        let (width, height) = (self.size.width as usize, self.size.height as usize);
+        let picture = Picture::new(width, height, rgb)?;
+        Ok((picture, ground as f64 / (width * height) as f64))
+    }
+}
+
+/// The thesis's mountains alone.
+fn thesis(bench: &Bench, view: &str) -> Result<Job, CliError> {
+    bench.job(
+        "clear",
+        "thesis",
+        view,
+        &[("ATMOSPHERE", Value::Flag(false))],
+    )
+}
+
+fn larger(size: Size, by: u32) -> Size {
+    Size {
+        width: size.width * by,
+        height: size.height * by,
+    }
+}
+
+/// The rays through the middles of the pixels of a picture, row by row, and the angle of a pixel.
+fn rays(view: &View, size: Size) -> Result<(Vec<TerrainRay>, f32), CliError> {
+    let [middle, right, up] = view.rays()?.map(|v| v.as_dvec3());
+    let at = |i: u32, n: u32| 2.0 * (f64::from(i) + 0.5) / f64::from(n) - 1.0;
+    let mut rays = Vec::new();
+    for y in 0..size.height {
+        for x in 0..size.width {
+            let dir = middle + right * at(x, size.width) - up * at(y, size.height);
+            rays.push(TerrainRay {
+                origin: view.eye,
+                dir: dir.normalize().to_array(),
+                far: 100_000.0,
+            });
+        }
+    }
+    Ok((rays, (2.0 * up.length() / f64::from(size.height)) as f32))
+}
+
+fn line(bench: &Bench, name: &str, plan: &Plan) -> Result<Line, CliError> {
+    let job = thesis(bench, name)?;
+    let view = job.view(0.0, bench.size)?;
+    let exposure = f64::from(view.exposure);
+    let shown = |p: &Picture| p.display(exposure);
+    // Pictures first: they warm everything up.
+    let once = bench.picture(&job, 0.0, 1)?;
+    let thesis_psnr = psnr(&shown(&once), &shown(&bench.reference(&job, 0.0, SAMPLES)?));
+    let mut renderer = Renderer::new(
+        &bench.gpu,
+        job.catalog.set(),
+        &job.options,
+        bench.size,
+        Output::Linear,
+    )?;
+    renderer.warm_up(&view)?;
+    let mut drawers = Vec::new();
+    let mut presets = Vec::new();
+    let mut ground = 0.0;
+    for preset in PRESETS {
+        // The converged picture has the finest heights there are, and the rock of its preset.
+        let mut fine = Drawer::new(bench, preset, larger(bench.size, SAMPLES), 1024)?;
+        fine.frame(bench, &view)?;
+        let converged = fine.read(bench)?.0.averaged(SAMPLES as usize)?;
+        drop(fine);
+        let mut drawer = Drawer::new(bench, preset, bench.size, 0)?;
+        let first_bake = drawer.frame(bench, &view)?[0];
+        let (own, share) = drawer.read(bench)?;
+        ground = share;
+        presets.push(Entry {
+            draws: Vec::new(),
+            first_bake,
+            bakes: Vec::new(),
+            flown: Vec::new(),
+            psnr: psnr(&shown(&own), &shown(&converged)),
+        });
+        drawers.push(drawer);
+    }
+    let mut times = Vec::new();
+    for _ in 0..plan.rounds {
+        let cost = renderer.draw(&view, Tiling::Adaptive, &mut |_| {})?;
+        times.push(cost.cpu_ms.unwrap_or(f64::NAN));
+        for (drawer, entry) in drawers.iter_mut().zip(&mut presets) {
+            drawer.frame(bench, &view)?;
+            entry.draws.push(drawer.frame(bench, &view)?[1]);
+        }
+    }
+    for (drawer, entry) in drawers.iter_mut().zip(&mut presets) {
+        for frame in 1..=30 {
+            let [baked, drawn] = drawer.frame(bench, &flown(&view, frame))?;
+            entry.bakes.push(baked);
+            entry.flown.push(drawn);
+        }
+    }
+    // Half as many pixels a side: the reference takes long.
+    let small = Size {
+        width: bench.size.width / 2,
+        height: bench.size.height / 2,
+    };
+    let (rays, angle) = rays(&view, small)?;
+    let land = Land::named("thesis")?;
+    let path = RayPath::Fast;
+    let found = ray_hits(&bench.gpu, veduta::programs(), &land, &rays, angle, path)?;
+    let columns = small.width as usize;
+    Ok(Line {
+        view: name.to_owned(),
+        ground,
+        thesis: times,
+        thesis_psnr,
+        presets,
+        hits: hit_errors(&land, &rays, columns, f64::from(angle), &found)?,
+    })
+}
+
+/// The view after some frames of the flight.
+fn flown(view: &View, frame: usize) -> View {
+    let forward = view
+        .world_from_view
+        .transform_vector3(Vec3::NEG_Z)
+        .as_dvec3();
+    let azimuth = forward.x.atan2(-forward.z);
+    let mut view = view.clone();
+    view.eye = view
+        .eye
+        .moved_by(direction(0.0, azimuth) * (FLIGHT.0 / FLIGHT.1 * frame as f64));
+    view
+}
+
+/// Mean change between frames, of pictures less their converged ones.
+fn unexplained(frames: &[(Vec<u8>, Vec<u8>)]) -> f64 {
+    let mut sum = 0.0;
+    let mut count = 0_usize;
+    for pair in frames.windows(2) {
+        let [(shown, truth), (next_shown, next_truth)] = pair else {
+            continue;
+        };
+        for k in 0..shown.len() {
+            let change = f64::from(next_shown[k]) - f64::from(shown[k]);
+            let motion = f64::from(next_truth[k]) - f64::from(truth[k]);
+            sum += (change - motion).abs();
+            count += 1;
+        }
+    }
+    sum / count.max(1) as f64
+}
+
+/// A flight with V01's eye and sun, at half the size and with a quarter of the samples.
+fn flicker(bench: &Bench, frames: usize) -> Result<Flicker, CliError> {
+    let small = Size {
+        width: bench.size.width / 2,
+        height: bench.size.height / 2,
+    };
+    let samples = SAMPLES / 2;
+    let job = thesis(bench, "V01")?;
+    let mut view = job.view(0.0, small)?;
+    view.look(0.0, -0.1, 60_f32.to_radians(), small.aspect() as f32);
+    let exposure = f64::from(view.exposure);
+    let mut renderers = Vec::new();
+    for size in [small, larger(small, samples)] {
+        renderers.push(Renderer::new(
+            &bench.gpu,
+            job.catalog.set(),
+            &job.options,
+            size,
+            Output::Linear,
+        )?);
+    }
+    let mut shown = Vec::new();
+    for frame in 0..frames {
+        let view = flown(&view, frame);
+        let mut both = Vec::new();
+        for (renderer, by) in renderers.iter_mut().zip([1, samples]) {
+            renderer.draw(&view, Tiling::Adaptive, &mut |_| {})?;
+            let rgb: Vec<f32> = renderer
+                .read_rgba32()?
+                .chunks_exact(4)
+                .flat_map(|p| [p[0], p[1], p[2]])
+                .collect();
+            let size = larger(small, by);
+            let picture = Picture::new(size.width as usize, size.height as usize, rgb)?;
+            both.push(picture.averaged(by as usize)?.display(exposure));
+        }
+        let truth = both.pop().unwrap_or_default();
+        shown.push((both.pop().unwrap_or_default(), truth));
+    }
+    let thesis = unexplained(&shown);
+    let mut presets = Vec::new();
+    for preset in PRESETS {
+        // As fine for its pixels as it is by default for those of the size that is measured.
+        let texels = if preset == "low" { 128 } else { 256 };
+        let mut once = Drawer::new(bench, preset, small, texels)?;
+        let mut fine = Drawer::new(bench, preset, larger(small, samples), 1024)?;
+        let mut shown = Vec::new();
+        for frame in 0..frames {
+            let view = flown(&view, frame);
+            once.frame(bench, &view)?;
+            fine.frame(bench, &view)?;
+            let truth = fine.read(bench)?.0.averaged(samples as usize)?;
+            shown.push((
+                once.read(bench)?.0.display(exposure),
+                truth.display(exposure),
+            ));
+        }
+        presets.push(unexplained(&shown));
+    }
+    Ok(Flicker { thesis, presets })
+}
+
+/// Measures every view.
+///
+/// # Errors
+/// Faults of the device, views that do not exist, a system that does not tell processor times.
+pub fn run(bench: &Bench, plan: &Plan, progress: &mut dyn FnMut(&str)) -> Result<Report, CliError> {
+    let mut lines = Vec::new();
+    for view in &plan.views {
+        progress(view);
+        lines.push(line(bench, view, plan)?);
+    }
+    let flicker = if plan.frames > 1 {
+        progress("flight");
+        Some(flicker(bench, plan.frames)?)
+    } else {
+        None
+    };
+    let bytes = PRESETS
+        .iter()
+        .map(|p| {
+            Ok(Drawer::new(bench, p, bench.size, 0)?
+                .terrain
+                .resources()
+                .texture_bytes)
+        })
+        .collect::<Result<_, CliError>>()?;
+    Ok(Report {
+        lines,
+        flicker,
+        bytes,
+    })
+}
+
+/// Means over the views that show ground.
+fn mean(report: &Report, of: &dyn Fn(&Line) -> f64) -> f64 {
+    let values: Vec<f64> = report
+        .lines
+        .iter()
+        .filter(|l| l.ground > 0.0)
+        .map(of)
+        .collect();
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+fn middle(values: &[f64]) -> f64 {
+    Middle::of(values).median
+}
+
+fn average(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// The report as a document.
+pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
+    let mut rows = vec![
+        ["View", "ground", "`thesis` [ms]", "[dB]"]
+            .map(str::to_owned)
+            .to_vec(),
+    ];
+    for preset in PRESETS {
+        for head in ["[ms]", "/ thesis", "flight [ms]", "baked", "[dB]"] {
+            rows[0].push(if head == "[ms]" {
+                format!("`{preset}` [ms]")
+            } else {
+                head.to_owned()
+            });
+        }
+    }
+    for l in &report.lines {
+        let mut row = vec![
+            l.view.clone(),
+            format!("{:.0} %", 100.0 * l.ground),
+            format!("{:.1}", middle(&l.thesis)),
+            format!("{:.1}", l.thesis_psnr),
+        ];
+        for p in &l.presets {
+            row.push(format!("{:.1}", middle(&p.draws)));
+            row.push(Ratio::of(&p.draws, &l.thesis).to_string());
+            row.push(format!("{:.1}", average(&p.flown)));
+            row.push(format!("{:.1}", average(&p.bakes)));
+            row.push(format!("{:.1}", p.psnr));
+        }
+        rows.push(row);
+    }
+    let mut row = vec![
+        "mean".to_owned(),
+        String::new(),
+        format!("{:.1}", mean(report, &|l| middle(&l.thesis))),
+        format!("{:.1}", mean(report, &|l| l.thesis_psnr)),
+    ];
+    for k in 0..PRESETS.len() {
+        let draw = mean(report, &|l| middle(&l.presets[k].draws));
+        row.push(format!("{draw:.1}"));
+        row.push(format!(
+            "{:.3}",
+            draw / mean(report, &|l| middle(&l.thesis))
+        ));
+        row.push(format!(
+            "{:.1}",
+            mean(report, &|l| average(&l.presets[k].flown))
+        ));
+        row.push(format!(
+            "{:.1}",
+            mean(report, &|l| average(&l.presets[k].bakes))
+        ));
+        row.push(format!("{:.1}", mean(report, &|l| l.presets[k].psnr)));
+    }
+    rows.push(row);
+    let mut hits = vec![
+        [
+            "View",
+            "rays",
+            "hits",
+            "wrong [%]",
+            "at the silhouette [%]",
+            "out of steps",
+            "median",
+            "95 %",
+            "99 %",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    ];
+    for l in &report.lines {
+        let h = &l.hits;
+        let percent = |n: usize| format!("{:.3}", 100.0 * n as f64 / h.rays.max(1) as f64);
+        hits.push(vec![
+            l.view.clone(),
+            h.rays.to_string(),
+            h.across.len().to_string(),
+            percent(h.wrong),
+            percent(h.at_silhouette),
+            h.capped.to_string(),
+            format!("{:.3}", h.centile(0.5)),
+            format!("{:.3}", h.centile(0.95)),
+            format!("{:.3}", h.centile(0.99)),
+        ]);
+    }
+    let flight = report.flicker.as_ref().map_or(String::new(), |f| {
+        let list: Vec<String> = PRESETS
+            .iter()
+            .zip(&f.presets)
+            .map(|(p, v)| format!("`{p}` {v:.2} ({:.2} of it)", v / f.thesis))
+            .collect();
+        format!(
+            "\n## Changes that motion does not explain\n\nMean change from frame to frame of a flight from V01's place, level with a view 6 degrees down, less that of\nthe converged frames (half the size, 4 x 4 samples), in steps of 8 bits: `thesis` {:.2}, {}.\n",
+            f.thesis,
+            list.join(", "),
+        )
+    });
+    let bakes: Vec<String> = PRESETS
+        .iter()
+        .enumerate()
+        .map(|(k, p)| {
+            format!(
+                "`{p}` {:.0} ms and {:.1} MB",
+                mean(report, &|l| l.presets[k].first_bake),
+                report.bytes[k] as f64 / 1e6
+            )
+        })
+        .collect();
+    format!(
+        "# What the terrain costs and how far it is off\n\nWritten by `{command}`.\n\n{}\n\
+         The mountains of the preset `thesis` alone, without air or clouds, and the land `thesis` with its lights. Milliseconds are those of a draw (median)\n\
+         and, in a flight at 100 m/s with 30 frames a second, of a draw and of baking (means). PSNR is that of each against itself with {SAMPLES} x {SAMPLES} samples a\n\
+         pixel. The last line is the mean over the views that show ground. The first bake and the memory: {}.\n\n{}\n\
+         ## Hits\n\nRays of half as many pixels a side, as `high` follows them, against bracketing in f64; errors across the ray in footprints.\n\n{}{flight}",
+        bench.machine(),
+        bakes.join(", "),
+        table(&rows),
+        table(&hits),
+    )
+}
+
+/// The same as JSON.
+pub fn to_json(bench: &Bench, report: &Report, command: &str) -> serde_json::Value {
+    let mut document = bench.head(command);
+    document["views"] = report
+        .lines
+        .iter()
+        .map(|l| {
+            json!({
+                "view": l.view,
+                "ground": l.ground,
+                "thesis": l.thesis,
+                "thesis_psnr": l.thesis_psnr,
+                "presets": PRESETS.iter().zip(&l.presets).map(|(name, p)| json!({
+                    "preset": name,
+                    "draws": p.draws,
+                    "first_bake": p.first_bake,
+                    "flight_draw": average(&p.flown),
+                    "flight_bake": average(&p.bakes),
+                    "psnr": p.psnr,
+                })).collect::<Vec<_>>(),
+                "hits": {
+                    "rays": l.hits.rays,
+                    "met": l.hits.across.len(),
+                    "wrong": l.hits.wrong,
+                    "at_silhouette": l.hits.at_silhouette,
+                    "capped": l.hits.capped,
+                    "centile_99": l.hits.centile(0.99),
+                },
+            })
+        })
+        .collect::<Vec<_>>()
+        .into();
+    if let Some(f) = &report.flicker {
+        document["unexplained_change"] = json!({ "thesis": f.thesis, "presets": f.presets });
+    }
+    document
+}
