@@ -1249,7 +1249,8 @@ pub fn registry() -> Vec<Entry> {
         "atmosphere::sun_disc",
         "atmosphere",
         atmosphere,
-        sun_disc
+        sun_disc,
+        disc_in_pixel
     );
     same!(
         list,
@@ -1941,7 +1942,7 @@ fn particular(entry: Entry) -> Entry {
         ("atmosphere::aerial", "aerial_spacing") => {
             entry.eye().jumps("the altitude of the change", 1e-6)
         }
-        ("atmosphere::sun_disc", _) => entry.unit("dir").unit("to_sun"),
+        ("atmosphere::sun_disc", "sun_disc") => entry.unit("dir").unit("to_sun"),
         ("clouds::field", "cloud_density") => entry
             .layer()
             .branch("altitude", &[4000.0, 5500.0])
