@@ -95,6 +95,16 @@ pub struct Work {
     pub bytes: u64,
 }
 
+impl std::ops::AddAssign for Work {
+    fn add_assign(&mut self, more: Work) {
+        self.bakes += more.bakes;
+        self.dispatches += more.dispatches;
+        self.draws += more.draws;
+        self.writes += more.writes;
+        self.bytes += more.bytes;
+    }
+}
+
 /// What a system keeps on the device for as long as it lives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Resources {

@@ -46,8 +46,8 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             &["AERIAL", "AERIAL_TARGETS"],
             &["AERIAL", "AERIAL_ALPHA"],
         ],
-        "air_columns" | "air_diffuse" | "air_transmittance" | "sky_view" | "sky_aerial"
-        | "sky_probe" | "sky_query" | "probe" => &[&[]],
+        "air_columns" | "air_diffuse" | "air_transmittance" | "sky_view" | "sky_refine"
+        | "sky_aerial" | "sky_probe" | "sky_query" | "probe" => &[&[]],
         "terrain" | "terrain_heights" => return vec![BTreeSet::new()],
         "terrain_bake" => {
             return vec![

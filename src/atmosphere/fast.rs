@@ -115,6 +115,11 @@ impl FastProbe {
         Ok(results)
     }
 
+    /// The tables that rays are read from, whose [`SkyTables::total_work`] tells what the rays have made.
+    pub fn tables(&self) -> &SkyTables {
+        &self.tables
+    }
+
     fn run_group(
         &mut self,
         device: &wgpu::Device,

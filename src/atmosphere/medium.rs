@@ -531,12 +531,14 @@ impl Atmosphere {
         Ok(words)
     }
 
-    /// The flags that the programs of the atmosphere need for this air: `AIR_EIGHT_LANES` for more than four lanes, and for more than one
-    /// that is not exponential.
+    /// The flags that the programs of the atmosphere need for this air: `AIR_EIGHT_LANES` for more than four lanes, for more than one
+    /// that is not exponential, and for one that is not and scatters.
     pub fn features(&self) -> &'static [&'static str] {
         let lanes = self.lanes();
         let ramps = lanes.iter().filter(|lane| lane.profile.is_ramps()).count();
-        if lanes.len() > 4 || ramps > 1 {
+        let scatters =
+            |lane: &Lane| lane.profile.is_ramps() && lane.scattering.iter().any(|s| *s > 0.0);
+        if lanes.len() > 4 || ramps > 1 || lanes.iter().any(scatters) {
             &["AIR_EIGHT_LANES"]
         } else {
             &[]

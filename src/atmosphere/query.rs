@@ -116,7 +116,7 @@ impl SkyQuery {
     }
 
     /// The light at each place, in their order. Submits and waits; makes those tables anew that the air of `tables` asks for, none for an
-    /// eye. What [`SkyTables::prepare`] has recorded before must have been submitted. The sky's light is summed over 768 directions of every
+    /// eye; [`SkyTables::total_work`] counts them. What [`SkyTables::prepare`] has recorded before must have been submitted. The sky's light is summed over 768 directions of every
     /// place, each a march through the tables.
     ///
     /// # Errors

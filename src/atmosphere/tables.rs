@@ -16,7 +16,7 @@ pub struct SkyQuality {
     pub columns: [u32; 2],
     /// Diffuse light: sun's height by altitude, each in [2, 1024].
     pub diffuse: [u32; 2],
-    /// Sky: azimuth by height above the horizon, each in [2, 1024].
+    /// Sky: azimuth by height above the horizon, each in [2, 1024]. Of each row that is computed the table has four: the others are interpolated by cubics.
     pub sky: [u32; 2],
     /// Steps on each stretch of a ray of the sky, in [1, 64].
     pub sky_steps: u32,
@@ -97,6 +97,9 @@ impl SkyQuality {
         Ok(())
     }
 }
+
+/// Rows that the table of the sky has for each that is computed.
+const ROWS_OF_EACH: u32 = 4;
 
 /// Where an eye is, as far as the tables depend on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -288,12 +291,15 @@ pub struct SkyTables {
     sampler: wgpu::Sampler,
     columns: Table,
     moments: [Table; 3],
+    /// Rows of the sky that are computed.
+    sky_computed: Table,
+    /// The sky with further rows between those.
     sky: Table,
     /// Light and depths of the air before things, and the pass that makes them.
     before: Option<Before>,
     bake_columns: Bake,
     bake_moments: Vec<Bake>,
-    bake_sky: Bake,
+    bake_sky: [Bake; 2],
     /// What the buffer `air` holds.
     air_bytes: Vec<u8>,
     /// What the buffer `eye` holds.
@@ -303,6 +309,8 @@ pub struct SkyTables {
     columns_of: Option<Vec<u8>>,
     moments_of: Option<Vec<u8>>,
     eye_of: Option<EyeKey>,
+    /// All that has been done since the tables are there.
+    work: Work,
 }
 
 /// The tables of the air before things.
@@ -390,7 +398,9 @@ impl SkyTables {
         let columns = Table::new(device, "veduta columns", quality.columns, Some(2));
         let moments =
             [1, 2, 3].map(|_| Table::new(device, "veduta diffuse light", quality.diffuse, Some(3)));
-        let sky = Table::new(device, "veduta sky", quality.sky, Some(2));
+        let sky_computed = Table::new(device, "veduta sky", quality.sky, Some(2));
+        let fine = [quality.sky[0], quality.sky[1] * ROWS_OF_EACH];
+        let sky = Table::new(device, "veduta sky between its rows", fine, Some(2));
         let air_bound = (0, air.as_entire_binding());
         let eye_bound = (1, eye.as_entire_binding());
         let linear = (0, wgpu::BindingResource::Sampler(&sampler));
@@ -464,10 +474,25 @@ impl SkyTables {
                 &[
                     &[air_bound.clone(), eye_bound.clone()],
                     &read,
-                    &[at(0, &sky)],
+                    &[at(0, &sky_computed)],
                 ],
             ),
             workgroups: groups_of(quality.sky, [8, 8]),
+        };
+        let (pipeline, layouts) = compute(device, programs, atmosphere, "sky_refine", &[])?;
+        let refine_sky = Bake {
+            pipeline,
+            groups: bind_groups(
+                device,
+                "veduta sky between its rows",
+                &layouts,
+                &[
+                    std::slice::from_ref(&eye_bound),
+                    &[at(0, &sky_computed)],
+                    &[at(0, &sky)],
+                ],
+            ),
+            workgroups: groups_of(fine, [8, 8]),
         };
         let before = if before {
             let [width, height] = quality.aerial;
@@ -523,17 +548,19 @@ impl SkyTables {
             sampler,
             columns,
             moments,
+            sky_computed,
             sky,
             before,
             bake_columns,
             bake_moments,
-            bake_sky,
+            bake_sky: [bake_sky, refine_sky],
             air_bytes: Vec::new(),
             eye_bytes: Vec::new(),
             look_bytes: Vec::new(),
             columns_of: None,
             moments_of: None,
             eye_of: None,
+            work: Work::default(),
         })
     }
 
@@ -566,7 +593,8 @@ impl SkyTables {
         Ok(())
     }
 
-    /// Uploads what has changed and records what has to be made anew for an eye.
+    /// Uploads what has changed and records what has to be made anew for an eye. Tables count as made once they are recorded: submit the encoder before
+    /// anything reads them, or call [`SkyTables::forget`] when it is dropped instead.
     ///
     /// # Errors
     /// As [`Eye::check`].
@@ -598,7 +626,9 @@ impl SkyTables {
             self.eye_of = None;
         }
         if self.eye_of != Some(key) {
-            self.bake_sky.record(encoder, "veduta sky", &mut work);
+            for pass in &self.bake_sky {
+                pass.record(encoder, "veduta sky", &mut work);
+            }
             if let Some(before) = &self.before {
                 before
                     .bake
@@ -606,7 +636,22 @@ impl SkyTables {
             }
             self.eye_of = Some(key);
         }
+        self.work += work;
         Ok(work)
+    }
+
+    /// Counts no table as made: the next [`SkyTables::prepare`] records them all. For a host that has dropped an encoder with tables in it, or whose
+    /// device has failed to run it.
+    pub fn forget(&mut self) {
+        self.columns_of = None;
+        self.moments_of = None;
+        self.eye_of = None;
+    }
+
+    /// All work on these tables since they are there, that of queries ([`SkyQuery`](super::SkyQuery), [`FastProbe`](super::FastProbe)) included: the
+    /// difference of two calls is what was done between them.
+    pub fn total_work(&self) -> Work {
+        self.work
     }
 
     /// As [`SkyTables::prepare`], but only what does not depend on an eye: columns and diffuse light.
@@ -622,6 +667,7 @@ impl SkyTables {
         if air_anew {
             self.eye_of = None;
         }
+        self.work += work;
         Ok(work)
     }
 
@@ -673,7 +719,8 @@ impl SkyTables {
     }
 
     fn look_block(&self, eye: &EyeBlock) -> LookBlock {
-        let [width, rows] = self.quality.sky.map(f64::from);
+        let [width, rows] =
+            [self.quality.sky[0], self.quality.sky[1] * ROWS_OF_EACH].map(f64::from);
         let [sx, _, sz] = eye.to_sun.map(f64::from);
         let flat = sx.hypot(sz);
         let across = 0.5 * (width - 1.0) / width;
@@ -705,20 +752,20 @@ impl SkyTables {
     /// What the tables keep on the device.
     pub fn resources(&self) -> Resources {
         let before = self.before.as_ref();
-        let tables: Vec<&Table> = [&self.columns, &self.sky]
+        let tables: Vec<&Table> = [&self.columns, &self.sky_computed, &self.sky]
             .into_iter()
             .chain(before.into_iter().flat_map(|b| [&b.light, &b.depths]))
             .chain(&self.moments)
             .collect();
-        let bakes: Vec<&Bake> = [&self.bake_columns, &self.bake_sky]
-            .into_iter()
+        let bakes: Vec<&Bake> = std::iter::once(&self.bake_columns)
+            .chain(&self.bake_sky)
             .chain(before.map(|b| &b.bake))
             .chain(&self.bake_moments)
             .collect();
         Resources {
             pipelines: bakes.len() as u32,
             bind_groups: bakes.iter().map(|b| b.groups.len() as u32).sum(),
-            bindings: 2 + 3 * 5 + 6 + if before.is_some() { 7 } else { 0 },
+            bindings: 2 + 3 * 5 + 6 + 3 + if before.is_some() { 7 } else { 0 },
             buffers: 3,
             buffer_bytes: self.air.size() + self.eye.size() + self.look.size(),
             textures: tables.len() as u32,

@@ -103,6 +103,11 @@ impl TransmittanceTable {
         Ok(work)
     }
 
+    /// Counts the table as not made: the next [`TransmittanceTable::prepare`] records it. For a host that has dropped the encoder.
+    pub fn forget(&mut self) {
+        self.made = false;
+    }
+
     /// Zenith angles by altitudes.
     pub fn size(&self) -> [u32; 2] {
         self.size

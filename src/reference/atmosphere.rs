@@ -238,3 +238,29 @@ pub fn sun_disc(dir: [f64; 3], to_sun: [f64; 3], angular_radius: f64, pixel_angl
     }
     coverage(length(cross).atan2(dot(dir, to_sun))) / area
 }
+
+/// Area of a disc within the unit square about the origin, by quadrature over the square's height between the places where the disc's edge crosses its
+/// sides.
+pub fn disc_in_pixel(centre: [f64; 2], radius: f64) -> f64 {
+    let edges = |k: usize| [-0.5, 0.5].map(|e: f64| ((e - centre[k]) / radius).clamp(-1.0, 1.0));
+    let ([left, right], [low, high]) = (edges(0), edges(1));
+    // In angles about the disc's centre chords are smooth up to their ends.
+    let mut angles = vec![low.asin(), high.asin()];
+    for x in [left, right] {
+        let at = x.clamp(-1.0, 1.0).acos().sin().asin();
+        angles.extend([-at, at]);
+    }
+    angles.sort_by(f64::total_cmp);
+    let within = |a: &f64| (low.asin()..=high.asin()).contains(a);
+    let angles: Vec<f64> = angles.into_iter().filter(within).collect();
+    let mut area = 0.0;
+    for ends in angles.windows(2) {
+        let half = 0.5 * (ends[1] - ends[0]);
+        for (x, w) in gauss_legendre(12) {
+            let chord = (0.5 * (ends[0] + ends[1]) + half * x).cos();
+            let width = right.clamp(-chord, chord) - left.clamp(-chord, chord);
+            area += half * w * width * chord;
+        }
+    }
+    area * radius * radius
+}

@@ -491,3 +491,40 @@ fn the_suns_disc_keeps_its_irradiance_at_every_pixel_size() {
         assert!((whole - 1.0).abs() < 2e-3, "{pixel}: {whole}");
     }
 }
+
+#[test]
+fn a_disc_is_shared_out_among_pixels() {
+    let mut rows: Vec<[f32; 3]> = Vec::new();
+    let radii = [0.05_f32, 0.3, 0.5, 0.7, 1.3, 3.9];
+    let places = [[0.0_f32, 0.0], [0.5, 0.5], [0.31, -0.18], [-0.02, 0.47]];
+    for radius in radii {
+        for [x, y] in places {
+            for pixel in 0..121 {
+                let [i, j] = [pixel % 11, pixel / 11].map(|k: i32| (k - 5) as f32);
+                rows.push([x - i, y - j, radius]);
+            }
+        }
+    }
+    let found = evaluator(
+        &["veduta::atmosphere::sun_disc::{disc_in_pixel}"],
+        "",
+        "disc_in_pixel(vec2f(in.f[0], in.f[1]), in.f[2])",
+        3,
+    )
+    .run(&bits(&rows))
+    .unwrap();
+    for (found, row) in found.iter().zip(&rows) {
+        let [x, y, r] = row.map(f64::from);
+        let truth = atmosphere::disc_in_pixel([x, y], r);
+        assert!((found - truth).abs() < 1e-5, "{row:?}: {found} {truth}");
+    }
+    for (found, row) in found.chunks(121).zip(rows.chunks(121)) {
+        let whole = std::f64::consts::PI * f64::from(row[0][2]).powi(2);
+        let sum: f64 = found.iter().sum();
+        assert!(
+            (sum / whole - 1.0).abs() < 1e-3,
+            "{:?}: {sum} {whole}",
+            row[0]
+        );
+    }
+}

@@ -561,8 +561,8 @@ fn crossing_the_top_of_the_air_changes_no_pixel() {
         println!(
             "pitch {pitch}, sun {sun:?}: 2 m {metre:.5}, 200 m {across:.5}, beside {beside:.5}"
         );
-        // Row A12 wants 0.01, which a pixel at the horizon misses: the limb has other rows within the air than above it.
-        assert!(metre < 0.03 && across < 0.01 + beside);
+        // The limb has other rows within the air than above it; a pixel at the horizon comes near the bar of row A12.
+        assert!(metre < 0.01 && across < 0.01 + beside);
     }
 }
 
@@ -697,11 +697,28 @@ fn the_suns_disc_keeps_its_irradiance_at_every_size() {
                 let found = disc_of(&shoot(&mut sky, &view), &view);
                 let off = [0, 1, 2].map(|c| found[c] / f64::from(through[c]) - 1.0);
                 println!("{altitude} m, sun {height}, fov {fov}: {off:.4?}");
-                // A pixel larger than the disc keeps its irradiance on average over the places of the disc among the pixels only.
-                assert!(fov > 30.0 || off.iter().all(|o| o.abs() < 0.03));
+                assert!(off.iter().all(|o| o.abs() < 0.03));
             }
         }
     }
+    // Nor does it flicker while it wanders over pixels larger than itself.
+    let mut seen = Vec::new();
+    for step in 0..24 {
+        let yaw = 17.19 + 0.113 * f64::from(step);
+        let view = looking(
+            2.0,
+            [yaw, 33.0 + 0.031 * f64::from(step), 60.0],
+            [30.0, 17.19],
+        );
+        seen.push(disc_of(&shoot(&mut sky, &view), &view)[1]);
+    }
+    let mean = seen.iter().sum::<f64>() / seen.len() as f64;
+    let most = seen
+        .iter()
+        .map(|s| (s / mean - 1.0).abs())
+        .fold(0.0, f64::max);
+    println!("a wandering disc: mean {mean:.4}, {most:.4} off at most");
+    assert!(most < 0.01);
     // Below the horizon there is none, neither from the ground nor from orbit.
     for (altitude, height) in [(2.0, -2.0), (4e5, -25.0)] {
         let view = looking(altitude, [0.0, height, 10.0], [height, 0.0]);
@@ -829,8 +846,8 @@ fn a_still_frame_makes_nothing_anew() {
     let view = looking(100.0, [0.0, 10.0, 60.0], [30.0, 40.0]);
     assert_eq!(
         work(&view),
-        (5, 5, 4),
-        "the air's four tables, the eye's sky"
+        (6, 6, 4),
+        "the air's four tables, the eye's sky and the rows between its rows"
     );
     assert_eq!(work(&view), (0, 0, 0), "still");
     let turned = looking(100.0, [70.0, -20.0, 40.0], [30.0, 40.0]);
@@ -840,10 +857,10 @@ fn a_still_frame_makes_nothing_anew() {
     assert_eq!(work(&moved), (0, 0, 0), "elsewhere at this altitude");
     let later = looking(100.0, [70.0, -20.0, 40.0], [31.0, 40.0]);
     let (bakes, dispatches, writes) = work(&later);
-    assert_eq!((bakes, dispatches), (1, 1), "another sun");
+    assert_eq!((bakes, dispatches), (2, 2), "another sun");
     assert!(writes <= 3);
     let higher = looking(200.0, [70.0, -20.0, 40.0], [31.0, 40.0]);
-    assert_eq!(work(&higher).0, 1, "another altitude");
+    assert_eq!(work(&higher).0, 2, "another altitude");
 }
 
 #[test]
@@ -1322,7 +1339,8 @@ fn arcs_of_the_sky_are_as_smooth_as_the_reference() {
     factors.sort_by(|a, b| b.0.total_cmp(&a.0));
     let failing = factors.iter().filter(|f| f.0 > 2.0).count();
     println!("{failing} of {} arcs above 2", factors.len());
-    assert!(factors.iter().all(|f| f.0.is_finite()) && failing <= 7);
+    // What is left are the two along the horizon under a sun that touches it.
+    assert!(factors.iter().all(|f| f.0.is_finite()) && failing <= 2);
     for (factor, arc) in factors.iter().take(failing.max(4)) {
         println!("{factor:8.2}  {arc}");
     }
@@ -1395,4 +1413,97 @@ fn what_the_sky_draws_is_what_the_probe_finds() {
     let at = |share: f32| errors[(share * (errors.len() - 1) as f32) as usize];
     println!("median {:.4}, 99th centile {:.4}", at(0.5), at(0.99));
     assert!(at(0.5) < 0.005 && at(0.99) < 0.03);
+}
+
+/// A dusk sky in eight bits: dithered, the local mean over blocks is that of the picture in floats to a fraction of a step, where rounding alone leaves bands.
+#[test]
+fn eight_bits_are_dithered_without_bands() {
+    let gpu = gpu();
+    // That of the dither's matrix.
+    let block = 8;
+    let mut worst = [0.0_f64; 2];
+    for (height, exposure) in [(4.0, 0.3), (-4.0, 40.0), (-8.0, 2000.0)] {
+        let mut view = looking(2.0, [20.0, 14.0, 1.0], [height, 70.0]);
+        view.exposure = exposure;
+        let exact = shoot(&mut background(Preset::High), &view);
+        let bytes = |format| {
+            let targets = Targets {
+                color_format: format,
+                ..targets(Depth::default(), Projection::default())
+            };
+            let mut sky = sky_with(&targets, SkyComposition::Background, Preset::High);
+            let out = texture(
+                format,
+                1,
+                wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            );
+            let target = view_of(&out);
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let _ = sky.prepare(&gpu.queue, &mut encoder, &view).unwrap();
+            {
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                        view: &target,
+                        depth_slice: None,
+                        resolve_target: None,
+                        ops: wgpu::Operations::default(),
+                    })],
+                    ..Default::default()
+                });
+                let _ = sky.composite(&mut pass).unwrap();
+            }
+            gpu.queue.submit([encoder.finish()]);
+            gpu.read_texture(&out).unwrap()
+        };
+        let signal = |radiance: f32| {
+            let shown = 1.0 - (-f64::from(radiance) * f64::from(exposure)).exp();
+            255.0
+                * if shown <= 0.003_130_8 {
+                    12.92 * shown
+                } else {
+                    1.055 * shown.powf(1.0 / 2.4) - 0.055
+                }
+        };
+        let steps: Vec<[f64; 3]> = exact
+            .pixels
+            .iter()
+            .map(|p| [0, 1, 2].map(|c| signal(p[c])))
+            .collect();
+        let span = |c: usize| {
+            let of = steps.iter().map(|s| s[c]);
+            [of.clone().fold(255.0, f64::min), of.fold(0.0, f64::max)]
+        };
+        println!("sun {height}: steps {:?}", [0, 1, 2].map(span));
+        assert!((0..3).any(|c| span(c)[1] - span(c)[0] > 1.0 && span(c)[1] < 250.0));
+        for format in [
+            wgpu::TextureFormat::Rgba8Unorm,
+            wgpu::TextureFormat::Rgba8UnormSrgb,
+        ] {
+            let found = bytes(format);
+            let mut off = [0.0_f64; 2];
+            for y in 0..SIZE[1] / block {
+                for x in 0..SIZE[0] / block {
+                    for c in 0..3 {
+                        let mut sums = [0.0; 2];
+                        for k in 0..block * block {
+                            let i = ((y * block + k / block) * SIZE[0] + x * block + k % block)
+                                as usize;
+                            let true_step = steps[i][c];
+                            sums[0] += f64::from(found[4 * i + c]) - true_step;
+                            sums[1] += true_step.round() - true_step;
+                        }
+                        for (off, sum) in off.iter_mut().zip(sums) {
+                            *off = off.max(sum.abs() / f64::from(block * block));
+                        }
+                    }
+                }
+            }
+            println!("{format:?}: {:.3} of a step, rounded {:.3}", off[0], off[1]);
+            for (worst, off) in worst.iter_mut().zip(off) {
+                *worst = worst.max(off);
+            }
+        }
+    }
+    // Rounding alone would leave nearly half a step in a block: the test can tell.
+    assert!(worst[0] < 0.3 && worst[1] > 0.35, "{worst:?}");
 }

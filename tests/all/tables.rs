@@ -556,8 +556,10 @@ fn twilight_falls_with_every_tenth_of_a_degree() {
             }
         }
     }
-    // Paths become rare: what they say counts where they know it to 15 %.
-    for (i, samples) in [(0, 20_000), (20, 40_000)] {
+    // Paths become rare, and the few bright ones among them so much so that less than a million of them say too little, with too small an error: of 60,000 the
+    // blue of the horizon at -9 degrees is anything from half to twice its mean. What they say counts where they know it to 15 %.
+    let mut judged = 0;
+    for (i, samples) in [(0, 20_000), (20, 200_000), (30, 1_000_000), (40, 1_000_000)] {
         let some = [rays[2 * i], rays[2 * i + 1]];
         for (k, t) in truth(&air, &some, Orders::All, samples).iter().enumerate() {
             for c in 0..3 {
@@ -570,10 +572,13 @@ fn twilight_falls_with_every_tenth_of_a_degree() {
                     100.0 * off,
                     100.0 * own
                 );
-                assert!(own > 0.15 || off.abs() <= 0.3_f64.max(2.0 * own));
+                judged += usize::from(own <= 0.15);
+                assert!(own > 0.15 || off.abs() <= 0.3_f64.hypot(2.0 * own));
             }
         }
     }
+    println!("{judged} of 24 known well enough");
+    assert!(judged >= 14);
 }
 
 #[test]
@@ -634,15 +639,54 @@ fn no_eye_is_too_low_or_too_high_for_the_tables() {
     }
 }
 
+/// Layers that are no thicker than a step of the sky's rays, and scatter: from below, from within and from above.
+#[test]
+fn thin_layers_that_scatter_are_not_missed() {
+    let profiles = [
+        veduta::atmosphere::Profile::Tent {
+            bottom: 9000.0,
+            peak: 10_000.0,
+            top: 11_000.0,
+        },
+        veduta::atmosphere::Profile::Constant {
+            bottom: 20_000.0,
+            top: 20_300.0,
+        },
+    ];
+    let mut air = named("earth");
+    for profile in profiles {
+        let mut layer = air.layers[1].clone();
+        layer.profile = profile;
+        layer.scattering = [4e-5; 3];
+        layer.absorption = [4e-6; 3];
+        air.layers.push(layer);
+    }
+    let rays = rays_of_eyes(&air, 40, 30, 11);
+    let truth = truth(&air, &rays, Orders::Single, 0);
+    for (preset, share) in presets() {
+        let quality = SkyQuality {
+            all_orders: false,
+            ..quality(preset.clone())
+        };
+        let found = fast(&air, &quality, &rays);
+        let light = errors(&found, &truth, 1e-6, light);
+        println!("{preset:?}: in-scatter {}", shown(&light));
+        let (worst, at) = light[light.len() - 1];
+        println!("    {:.1} % at {}", 100.0 * worst, told(&air, &rays[at]));
+        assert!(centile(&light, 0.5) <= 0.005 * share);
+        assert!(centile(&light, 0.95) <= 0.05 * share);
+    }
+}
+
 #[test]
 fn only_what_has_changed_is_made_anew() {
     let earth = named("earth");
     let quality =
         SkyQuality::of(&Settings::resolve(veduta::programs(), &Preset::Low, None, &[]).unwrap());
     let mut tables = tables_of(&earth, &quality);
-    // Columns, three orders, sky, air before things.
+    // Columns, three orders, sky and the rows between its rows, air before things.
     let first = prepare(&mut tables, &NOON);
-    assert_eq!((first.bakes, first.writes), (6, 3));
+    assert_eq!((first.bakes, first.writes), (7, 3));
     assert_eq!(prepare(&mut tables, &NOON), veduta::Work::default());
     let turned = Eye {
         to_sun: [0.0, 0.8, -0.6],
@@ -656,41 +700,63 @@ fn only_what_has_changed_is_made_anew() {
         to_sun: [0.8, 0.6, 0.0],
         ..NOON
     };
-    assert_eq!(prepare(&mut tables, &sunk).bakes, 2);
+    assert_eq!(prepare(&mut tables, &sunk).bakes, 3);
     let risen = Eye {
         altitude: 3.0,
         ..sunk
     };
-    assert_eq!(prepare(&mut tables, &risen).bakes, 2);
+    assert_eq!(prepare(&mut tables, &risen).bakes, 3);
     let larger = Eye {
         sun_angular_radius: 0.01,
         ..risen
     };
-    assert_eq!(prepare(&mut tables, &larger).bakes, 2);
+    assert_eq!(prepare(&mut tables, &larger).bakes, 3);
     // All but the columns.
     let mut air = Atmosphere {
         ground_albedo: [0.1; 3],
         ..earth.clone()
     };
     tables.set_atmosphere(&air).unwrap();
-    assert_eq!(prepare(&mut tables, &larger).bakes, 5);
+    assert_eq!(prepare(&mut tables, &larger).bakes, 6);
     air.layers[0].scattering[1] *= 2.0;
     air.layers[2].absorption[0] *= 2.0;
     tables.set_atmosphere(&air).unwrap();
-    assert_eq!(prepare(&mut tables, &larger).bakes, 5);
+    assert_eq!(prepare(&mut tables, &larger).bakes, 6);
     air.layers[1].profile = veduta::atmosphere::Profile::Exponential {
         scale_height: 1300.0,
     };
     tables.set_atmosphere(&air).unwrap();
-    assert_eq!(prepare(&mut tables, &larger).bakes, 6);
+    assert_eq!(prepare(&mut tables, &larger).bakes, 7);
     tables.set_atmosphere(&air).unwrap();
     assert_eq!(prepare(&mut tables, &larger), veduta::Work::default());
+    // An encoder that is dropped takes its tables with it.
+    let before = tables.total_work();
+    tables.forget();
+    assert_eq!(prepare(&mut tables, &larger).bakes, 7);
+    assert_eq!(tables.total_work().bakes - before.bakes, 7);
+    assert_eq!(prepare(&mut tables, &larger), veduta::Work::default());
+    // Queries make what they need of the tables of the air, once.
+    tables.forget();
+    let query = SkyQuery::new(&gpu().device, veduta::programs(), &earth).unwrap();
+    let place = LightPlace {
+        altitude: 2.0,
+        to_sun: [0.0, 1.0, 0.0],
+        normal: [0.0, 1.0, 0.0],
+        sun_angular_radius: 0.0,
+    };
+    for made in [4, 0] {
+        let before = tables.total_work();
+        let _ = query
+            .run(&gpu().device, &gpu().queue, &mut tables, &[place])
+            .unwrap();
+        assert_eq!(tables.total_work().bakes - before.bakes, made);
+    }
     // Without light of higher orders its table is never made.
     let single = SkyQuality {
         all_orders: false,
         ..quality
     };
-    assert_eq!(prepare(&mut tables_of(&earth, &single), &NOON).bakes, 3);
+    assert_eq!(prepare(&mut tables_of(&earth, &single), &NOON).bakes, 4);
 }
 
 fn bits(rows: &[Vec<f32>]) -> Vec<u32> {

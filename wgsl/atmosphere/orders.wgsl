@@ -45,10 +45,16 @@ fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
     // The first order has more detail than the others, most of all behind the planet's shadow.
     let polar_count = select(4, 5, from_sun);
     let steps = select(6, select(8, 14, sun_mu < 0.02), from_sun);
-    for (var i = 0; i < 2 * polar_count; i++) {
-        let below = i >= polar_count;
-        let point = select(i, i - polar_count, below);
-        let polar = select(gauss_four(point), gauss_five(point), from_sun);
+    // At dusk light comes from a narrow band over the horizon: the upper half has two parts of nodes each.
+    let panels = select(1, 2, sun_mu < 0.02 && from_sun);
+    let above_count = panels * polar_count;
+    for (var i = 0; i < above_count + polar_count; i++) {
+        let below = i >= above_count;
+        let point = select(i % polar_count, i - above_count, below);
+        let share = select(1.0 / f32(panels), 1.0, below);
+        let first = select(f32(i / polar_count) * share, 0.0, below);
+        let node = select(gauss_four(point), gauss_five(point), from_sun);
+        let polar = vec2<f32>(first + share * node.x, share * node.y);
         // Dense at the horizon on both of its sides.
         let span = select(1.0 - horizon, -1.0 - horizon, below);
         let mu = horizon + span * (polar.x * polar.x);
@@ -67,9 +73,9 @@ fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
             var left = vec3<f32>(1.0);
             var light = vec3<f32>(0.0);
             for (var k = 0; k < steps; k++) {
-                let node = squared_node(steps, k);
-                let t = end * node.x;
-                let distance = end * node.y;
+                let place = squared_node(steps, k);
+                let t = end * place.x;
+                let distance = end * place.y;
                 let altitude = max(altitude_along(air.ground_radius, h, mu, t), 0.0);
                 let there_mu = clamp((r * mu + t) / (air.ground_radius + altitude), -1.0, 1.0);
                 let there_sun = clamp((r * sun_mu + t * nu) / (air.ground_radius + altitude), -1.0, 1.0);

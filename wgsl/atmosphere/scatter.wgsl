@@ -3,7 +3,7 @@
 //! symbols  t distance along the ray [m] · peaked light: that of layers with a peaked phase function, over the phase function of Air.peak
 #define_import_path veduta::atmosphere::scatter
 
-#import veduta::atmosphere::medium::{Air, Lanes, air_densities, air_extinction, air_scattering, air_phases, peak_phase}
+#import veduta::atmosphere::medium::{Air, FourLayers, Lanes, air_densities, air_extinction, air_scattering, air_phases, peak_phase}
 #import veduta::atmosphere::ray::{AirRay, ray_altitude, ray_sun_cosine, lowest_distance}
 #import veduta::atmosphere::columns::{sun_depth, sun_above_horizon}
 #import veduta::atmosphere::diffuse::{diffuse_moments, diffuse_source}
@@ -106,8 +106,41 @@ fn space_transmittance(columns: texture_2d_array<f32>, linear: sampler, air: Air
     return select(select(left, vec3<f32>(0.0), ray.meets_ground != 0u), vec3<f32>(1.0), ray.length <= 0.0);
 }
 
+#ifdef AIR_EIGHT_LANES
+/// The next place along a ray, beyond the distance `start` and before `end`, where the density of a lane of ramps that scatters has a bend at one of the altitudes `levels`.
+///
+/// internal
+fn next_bend(ray: AirRay, ground_radius: f32, levels: vec4<f32>, start: f32, end: f32) -> f32 {
+    let r = ground_radius + ray.altitude;
+    let low_at = -r * ray.mu;
+    let lowest = ray.altitude - r * (ray.mu * ray.mu) / (1.0 + ray.sine);
+    let aside = sqrt(max((levels - lowest) * (2.0 * ground_radius + levels + lowest), vec4<f32>(0.0)));
+    let none = vec4<f32>(end);
+    let past = vec4<f32>(start + 1.0);
+    let met = select(none, min(select(none, low_at - aside, low_at - aside > past), select(none, low_at + aside, low_at + aside > past)), levels > vec4<f32>(lowest));
+    return min(min(min(met.x, met.y), min(met.z, met.w)), end);
+}
+
+/// The next bend of four lanes.
+///
+/// internal
+fn next_bend_of_four(layers: FourLayers, ray: AirRay, ground_radius: f32, start: f32, end: f32) -> f32 {
+    let scatters = layers.scattering_red + layers.scattering_green + layers.scattering_blue > vec4<f32>(0.0);
+    var next = end;
+    for (var k = 0; k < 4; k++) {
+        if layers.rise[k] > 0.0 && scatters[k] {
+            let offsets = vec4<f32>(-layers.rise_offset[k], 1.0 - layers.rise_offset[k], 1.0 - layers.sink_offset[k], -layers.sink_offset[k]);
+            let levels = offsets / vec4<f32>(layers.rise[k], layers.rise[k], layers.sink[k], layers.sink[k]);
+            next = next_bend(ray, ground_radius, levels, start, next);
+        }
+    }
+    return next;
+}
+#endif
+
 /// Light scattered into a ray and its optical depth, over its whole length. `steps` are put on every stretch between
-/// the start, the lowest point, the edges of the planet's shadow and the end.
+/// the start, the lowest point, the edges of the planet's shadow and the end; with AIR_EIGHT_LANES also between the bends of lanes of ramps that scatter, so that no layer
+/// is thinner than a step.
 ///
 /// domain  steps in [1, 64] 1 lin
 /// domain  angular_radius in [0, 0.1] rad lin
@@ -125,7 +158,9 @@ fn scatter_along(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
     let second_or = select(second, select(ray.dark_from, dark_to, lowest > dark_to), lowest < ray.dark_from || lowest > dark_to);
     var result = Scattered(vec3<f32>(0.0), vec3<f32>(0.0), vec3<f32>(1.0));
     var from_edge = 0.0;
-    for (var stretch = 0; stretch < 4; stretch++) {
+    // Every lane has at most eight bends on a ray.
+    var stretch = 0;
+    for (var edge = 0; edge < 68 && stretch < 4; edge++) {
         var to_edge = ray.length;
         if stretch == 0 {
             to_edge = first;
@@ -134,6 +169,14 @@ fn scatter_along(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
         } else if stretch == 2 {
             to_edge = third;
         }
+#ifdef AIR_EIGHT_LANES
+        let whole = to_edge;
+        to_edge = next_bend_of_four(air.low, ray, air.ground_radius, from_edge, to_edge);
+        to_edge = next_bend_of_four(air.high, ray, air.ground_radius, from_edge, to_edge);
+        stretch += select(0, 1, to_edge >= whole);
+#else
+        stretch++;
+#endif
         let long = to_edge - from_edge;
         if long > 0.0 {
             let falling = to_edge <= lowest;

@@ -4,8 +4,8 @@
 //!
 //! The first rows hold directions above the horizon, the others those below: the last quarter, or half where `sky_coded`.
 //!
-//! A texel holds radiance for a sun of irradiance 1, over the reach of its direction and times the scale of the eye (where `sky_coded`, a code of that): layer 0 but for peaked light [1/sr], layer 1 peaked light over the peaked
-//! phase function [1].
+//! A texel holds radiance for a sun of irradiance 1, over the reach of its direction and times the scale of the eye (where `sky_coded`, a code of that): layer 0 but for peaked light, over 1 + nu^2, the shape
+//! of molecules' phase function [1/sr], layer 1 peaked light over the peaked phase function [1]. Rows between those that are computed are cubics through four of them.
 #define_import_path veduta::atmosphere::sky_view
 
 #import veduta::atmosphere::ray::{tangent_altitude}
@@ -208,8 +208,9 @@ fn sky_texel(look: SkyLook, ray: vec3<f32>) -> SkyTexel {
 /// internal
 fn sky_together(look: SkyLook, smooth_light: vec3<f32>, peaked: vec3<f32>, nu: f32) -> vec3<f32> {
     let base = max(look.peak_base - look.peak_slope * nu, 1e-9);
-    let phase = (look.peak_level + look.peak_square * (nu * nu)) / (base * sqrt(base));
-    return (smooth_light + peaked * phase) * look.gain;
+    let square = nu * nu;
+    let phase = (look.peak_level + look.peak_square * square) / (base * sqrt(base));
+    return (smooth_light * (1.0 + square) + peaked * phase) * look.gain;
 }
 
 /// Radiance of the sky, or of the ground and the air before it, for a sun of irradiance 1 and without its disc, that an eye within the air sees along a vector of any length.
@@ -442,7 +443,7 @@ fn sky_radiance(sky: texture_2d_array<f32>, linear: sampler, air: Air, eye: SkyE
     let peaked = textureSampleLevel(sky, linear, at, 1, 0.0).rgb;
     let factor = place.reach / eye.scale;
     if coded {
-        return (decode_dusk(smooth_light) + decode_dusk(peaked) * peak_phase(air, place.nu)) * factor;
+        return (decode_dusk(smooth_light) * (1.0 + place.nu * place.nu) + decode_dusk(peaked) * peak_phase(air, place.nu)) * factor;
     }
-    return (smooth_light + peaked * peak_phase(air, place.nu)) * factor;
+    return (smooth_light * (1.0 + place.nu * place.nu) + peaked * peak_phase(air, place.nu)) * factor;
 }

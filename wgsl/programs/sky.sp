@@ -61,7 +61,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
     let middle = vec2<f32>(dot(aside, draw_view.ray_right) / width, dot(aside, draw_view.ray_up) / height);
     // Away from the middle of the picture the disc is stretched.
     let reach = tan(eye.sun_angular_radius) / max(ahead * ahead, 1e-6);
-    let extent = vec2<f32>(reach * inverseSqrt(width), reach * inverseSqrt(height)) * 1.1 + 0.02;
+    let extent = vec2<f32>(reach * inverseSqrt(width), reach * inverseSqrt(height)) * 1.1 + 0.03;
     // Beyond the picture when the sun is behind the eye.
     let clip = select(middle + side * extent, vec2<f32>(2.0), ahead <= 1e-3 || draw_view.parallel != 0u);
     let ray = draw_view.ray_middle + clip.x * draw_view.ray_right + clip.y * draw_view.ray_up;
@@ -89,12 +89,12 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::atmosphere::ray::{AirLight, air_ray}
 #import veduta::atmosphere::aerial::{aerial_light}
 #import veduta::atmosphere::scatter::{space_transmittance}
-#import veduta::atmosphere::sun_disc::{sun_disc}
+#import veduta::atmosphere::sun_disc::{sun_disc, disc_in_pixel}
 #else
 #ifdef SUN_DISC
 #import veduta::atmosphere::ray::{air_ray}
 #import veduta::atmosphere::scatter::{space_transmittance}
-#import veduta::atmosphere::sun_disc::{sun_disc}
+#import veduta::atmosphere::sun_disc::{sun_disc, disc_in_pixel}
 #endif
 #endif
 #import veduta::tone_map::exponential::{exponential}
@@ -143,9 +143,50 @@ fn background(ray: vec3<f32>) -> vec3<f32> {
 }
 
 #ifdef AERIAL
+// Radiance of the sun's disc without the air before it; `right` and `down` are what the direction differs by at the next pixels. Discs of a few pixels are
+// the area of a circle within the pixel, so that their irradiance does not depend on where they stand among pixels.
+fn disc_seen(dir: vec3<f32>, right: vec3<f32>, down: vec3<f32>) -> f32 {
+    let beside = eye.to_sun - dir;
+    let across = dot(right, right);
+    let along = dot(down, down);
+    let both = dot(right, down);
+    let square = max(across * along - both * both, 1e-28);
+    let pixel = sqrt(sqrt(square));
+    let radius = eye.sun_angular_radius / pixel;
+    let u = dot(beside, right);
+    let v = dot(beside, down);
+    let centre = clamp(vec2<f32>(along * u - both * v, across * v - both * u) / square, vec2<f32>(-64.0), vec2<f32>(64.0));
+    let covered = disc_in_pixel(centre, clamp(radius, 1e-3, 16.0)) / (3.14159265 * max(eye.sun_angular_radius * eye.sun_angular_radius, 1e-14));
+    let small = select(0.0, covered, dot(dir, eye.to_sun) > 0.0);
+    return select(sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel), small, radius < 4.0);
+}
+
+#else
+#ifdef SUN_DISC
+// Radiance of the sun's disc without the air before it; `right` and `down` are what the direction differs by at the next pixels. Discs of a few pixels are
+// the area of a circle within the pixel, so that their irradiance does not depend on where they stand among pixels.
+fn disc_seen(dir: vec3<f32>, right: vec3<f32>, down: vec3<f32>) -> f32 {
+    let beside = eye.to_sun - dir;
+    let across = dot(right, right);
+    let along = dot(down, down);
+    let both = dot(right, down);
+    let square = max(across * along - both * both, 1e-28);
+    let pixel = sqrt(sqrt(square));
+    let radius = eye.sun_angular_radius / pixel;
+    let u = dot(beside, right);
+    let v = dot(beside, down);
+    let centre = clamp(vec2<f32>(along * u - both * v, across * v - both * u) / square, vec2<f32>(-64.0), vec2<f32>(64.0));
+    let covered = disc_in_pixel(centre, clamp(radius, 1e-3, 16.0)) / (3.14159265 * max(eye.sun_angular_radius * eye.sun_angular_radius, 1e-14));
+    let small = select(0.0, covered, dot(dir, eye.to_sun) > 0.0);
+    return select(sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel), small, radius < 4.0);
+}
+
+#endif
+#endif
+#ifdef AERIAL
 // Radiance of the sun's disc; parallel rays have none, since all would meet it or none.
-fn disc(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
-    let seen = select(1.0, 0.0, draw_view.parallel != 0u) * sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle);
+fn disc(dir: vec3<f32>, right: vec3<f32>, down: vec3<f32>) -> vec3<f32> {
+    let seen = select(1.0, 0.0, draw_view.parallel != 0u) * disc_seen(dir, right, down);
     return seen * from_space(dir);
 }
 
@@ -157,9 +198,9 @@ fn from_space(dir: vec3<f32>) -> vec3<f32> {
 #else
 #ifdef SUN_DISC
 // Radiance of the sun's disc.
-fn disc(dir: vec3<f32>, pixel_angle: f32) -> vec3<f32> {
+fn disc(dir: vec3<f32>, right: vec3<f32>, down: vec3<f32>) -> vec3<f32> {
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
-    return sun_disc(dir, eye.to_sun, eye.sun_angular_radius, pixel_angle) * space_transmittance(columns, linear, air, ray);
+    return disc_seen(dir, right, down) * space_transmittance(columns, linear, air, ray);
 }
 #endif
 #endif
@@ -221,10 +262,11 @@ struct Layers {
 @fragment
 fn draw(in: Corner) -> Layers {
     let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
-    let pixel_angle = length(dpdx(dir));
+    let right = dpdx(dir);
+    let down = dpdy(dir);
     let seen = textureLoad(depth, vec2<i32>(in.position.xy), 0);
     if seen == draw_view.far_depth {
-        return Layers(vec4<f32>((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance, 1.0), vec4<f32>(from_space(dir), 1.0));
+        return Layers(vec4<f32>((background(dir) + disc(dir, right, down)) * draw_view.sun_irradiance, 1.0), vec4<f32>(from_space(dir), 1.0));
     }
     let front = before(in.ray, seen);
     return Layers(vec4<f32>(front.in_scatter * draw_view.sun_irradiance, 1.0), vec4<f32>(front.transmittance, 1.0));
@@ -233,7 +275,8 @@ fn draw(in: Corner) -> Layers {
 @fragment
 fn draw(in: Corner) -> @location(0) vec4<f32> {
     let dir = select(normalize(in.ray), draw_view.forward, draw_view.parallel != 0u);
-    let pixel_angle = length(dpdx(dir));
+    let right = dpdx(dir);
+    let down = dpdy(dir);
     let texel = vec2<i32>(in.position.xy);
     let held = textureLoad(picture, texel, 0);
 #ifdef AERIAL_ALPHA
@@ -245,7 +288,7 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
 #endif
     if nothing {
         // The host's picture holds what is in space: its stars shine through the air.
-        return shown((background(dir) + disc(dir, pixel_angle)) * draw_view.sun_irradiance + held.rgb * from_space(dir), in.position.xy);
+        return shown((background(dir) + disc(dir, right, down)) * draw_view.sun_irradiance + held.rgb * from_space(dir), in.position.xy);
     }
     let front = before(in.ray, seen);
     let radiance = front.in_scatter * draw_view.sun_irradiance + front.transmittance * held.rgb;
@@ -258,7 +301,7 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     let ray = select(in.ray, draw_view.forward, draw_view.parallel != 0u);
 #ifdef SUN_DISC
     let dir = normalize(ray);
-    let radiance = background(dir) + disc(dir, length(dpdx(dir)));
+    let radiance = background(dir) + disc(dir, dpdx(dir), dpdy(dir));
 #else
     var radiance = vec3<f32>(0.0);
     if EYE_PLACE != 0 {

@@ -1,4 +1,4 @@
-The table of the sky as one eye sees it: every direction that leaves the air. Made anew when the sun or the eye's altitude changes.
+The table of the sky as one eye sees it: every direction that leaves the air. Made anew when the sun or the eye's altitude changes; `sky_refine` puts further rows between its rows.
 
 #PROGRAM{ sky_view }#
 
@@ -11,7 +11,7 @@ The table of the sky as one eye sees it: every direction that leaves the air. Ma
 #import veduta::atmosphere::scatter::{scatter_along}
 #import veduta::atmosphere::sky_view::{SkyEye, encode_dusk, sky_coded, sky_direction, sky_place, sky_rows}
 
-override SKY_STEPS: i32 = 12;
+override SKY_STEPS: i32 = 16;
 override ALL_ORDERS: i32 = 1;
 // Whether directions below the horizon show the ground too.
 override SKY_GROUND: i32 = 0;
@@ -45,7 +45,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
         light.smooth_light += light.transmittance * air.ground_albedo * (0.31830989 * (sun + around));
     }
     let factor = eye.scale / max(sky_place(eye, dir).reach, 1e-9);
-    var smooth_light = light.smooth_light * factor;
+    var smooth_light = light.smooth_light * (factor / (1.0 + ray.nu * ray.nu));
     var peaked_light = light.peaked_light * factor;
     if sky_coded(eye) {
         smooth_light = encode_dusk(smooth_light);
