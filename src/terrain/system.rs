@@ -177,7 +177,7 @@ impl Terrain {
             ("FIELD_KIND", f64::from(options.land.field.kind.number())),
             ("OUTPUT", output),
             ("MAX_MARCHING_STEPS", if low { 250.0 } else { 500.0 }),
-            ("REFINE_STEPS", if low { 1.0 } else { 2.0 }),
+            ("REFINE_STEPS", if low { 0.0 } else { 1.0 }),
             ("ROCK_CHEAP", f64::from(u8::from(low))),
         ];
         let ready = programs.get("terrain", &[])?.pipeline(

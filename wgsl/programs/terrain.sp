@@ -93,7 +93,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
     #CODE{
 #import veduta::planet::shell::{altitude_of}
 #import veduta::terrain::clipmap::{Clip, Sweep, clip_hit, sun_share}
-#import veduta::terrain::field::{Field}
+#import veduta::terrain::field::{Field, ground_at}
 #import veduta::terrain::refine::{refined_hit}
 #import veduta::terrain::material::{Rock, faded_noise, rock_low_faded, rock_high_faded, snow_blend}
 #import veduta::terrain::shading::{ThreeLights, shade_rough}
@@ -117,7 +117,7 @@ override FIELD_KIND: i32 = 2;
 override OUTPUT: i32 = 0;
 override MAX_MARCHING_STEPS: i32 = 200;
 // Steps from the baked ground to the field.
-override REFINE_STEPS: i32 = 2;
+override REFINE_STEPS: i32 = 1;
 // Whether the rock has one fractal instead of four.
 override ROCK_CHEAP: i32 = 0;
 
@@ -153,7 +153,10 @@ fn draw(in: Corner) -> Shown {
     let pixel = select(1e30, angle, is_met);
     let found = refined_hit(field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, vec3<f32>(0.0), dir, max(met, 1e-3), pixel, 2.0 * hit.spacing, select(0, REFINE_STEPS, is_met));
     let point = dir * found.distance;
-    let footprint = select(1e30, angle * found.distance, is_met);
+    // A pixel covers more ground the more it slants.
+    let normal = normalize(vec3<f32>(-hit.slope.x, 1.0, -hit.slope.y));
+    let footprint = select(1e30, angle * found.distance / max(-dot(normal, dir), 0.05), is_met);
+    let ground = ground_at(field, FIELD_KIND, point.xz, footprint);
     let altitude = altitude_of(clip.ground_radius, clip.eye_altitude, point);
     let light = sun_share(heights, shades, wrapping, places, clip, sweep, point.xz);
     let place = vec3<f32>(point.x, altitude, point.z);
@@ -165,10 +168,10 @@ fn draw(in: Corner) -> Shown {
     }
     let border = faded_noise(rock, place, vec3<i32>(1, 1, 1), 7u, footprint);
     // Slopes that are not resolved make the ground steeper than it looks, and the border of the snow wider.
-    let slope = found.ground.slope;
-    let lost = found.ground.lost;
+    let slope = ground.slope;
+    let lost = ground.lost;
     let level = inverseSqrt(1.0 + dot(slope, slope) + lost);
-    let blur = 0.5 * level * level * sqrt(lost * (1.0 - level * level));
+    let blur = 1.2 * level * level * sqrt(lost * (1.0 - level * level));
     let snow = snow_blend(level, border, draw_view.snow_edge_low - blur, draw_view.snow_edge_high + blur, draw_view.snow_noise);
     albedo = mix(albedo, draw_view.snow_albedo, snow);
     let lights = ThreeLights(draw_view.sun_light, draw_view.sky_light, draw_view.bounce_light);

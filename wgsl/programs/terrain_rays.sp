@@ -12,6 +12,7 @@ Where given rays meet a terrain, one invocation a ray: the textbook march, or th
 #endif
 
 override FIELD_KIND: i32 = 2;
+override REFINE_STEPS: i32 = 1;
 override MAX_MARCHING_STEPS: i32 = 200;
 override STEP_FACTOR: f32 = 0.5;
 override MARCH_EPSILON: f32 = 1.0;
@@ -61,8 +62,12 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     let capped = hit.steps == MAX_MARCHING_STEPS && hit.distance < 0.0;
     // A ray that ran out of steps on its way down has almost met it.
     let met = select(hit.distance, hit.reached, capped && hit.clearance < 0.05 * hit.reached);
-    let found = refined_hit(field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, ray.origin, ray.dir, max(met, 0.0), ray.pixel_angle, 2.0 * hit.spacing, 3);
-    results[id.x] = HitRow(select(found.distance, -1.0, met < 0.0), found.normal, found.ground.height, select(hit.steps, -1, capped));
+    let found = refined_hit(field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, ray.origin, ray.dir, max(met, 0.0), ray.pixel_angle, 2.0 * hit.spacing, REFINE_STEPS);
+    // The ground at the hit itself.
+    let at = ray.dir * max(found.distance, 0.0);
+    let ground = ground_at(field, FIELD_KIND, at.xz, ray.pixel_angle * max(found.distance, 0.0));
+    let gradient = up_at(clip.ground_radius, clip.eye_altitude, at) - vec3<f32>(ground.slope.x, 0.0, ground.slope.y);
+    results[id.x] = HitRow(select(found.distance, -1.0, met < 0.0), normalize(gradient), ground.height, select(hit.steps, -1, capped));
 #else
     var t = 0.0;
     var distance = -1.0;

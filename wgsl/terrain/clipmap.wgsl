@@ -50,6 +50,8 @@ struct ClipHit {
     clearance: f32,
     /// Spacing of the texel that was hit [m].
     spacing: f32,
+    /// Slope of its patch along x and z.
+    slope: vec2<f32>,
     /// Steps taken.
     steps: i32,
 }
@@ -129,7 +131,7 @@ fn clearing_tangent(ground_radius: f32, eye_altitude: f32, top: f32, near: f32, 
 /// outside undefined
 /// source  Tevs2008 (maxima of many sizes); departs: maxima of elevations, by sector and ring
 fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_2d<f32>, places: texture_2d<f32>, clip: Clip, dir: vec3<f32>, far: f32, max_steps: i32) -> ClipHit {
-    var hit = ClipHit(-1.0, 0.0, 0.0, clip.spacing, 0);
+    var hit = ClipHit(-1.0, 0.0, 0.0, clip.spacing, vec2<f32>(0.0), 0);
     let start = clip.eye_altitude;
     let radius = clip.ground_radius + start;
     let flat = select(dir.xz, vec2<f32>(1e-6), abs(dir.xz) < vec2<f32>(1e-6));
@@ -190,6 +192,7 @@ fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_
             hit.spacing = place.w;
             hit.steps += 1;
             if min(here, there) <= 0.0 {
+                hit.slope = 0.5 * place.z * vec2<f32>(h.y - h.x + h.w - h.z, h.z - h.x + h.w - h.y);
                 hit.distance = t + step * max(here, 0.0) / max(max(here, 0.0) - there, 1e-9);
                 done = true;
                 break;
