@@ -48,7 +48,9 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         ],
         "air_columns" | "air_diffuse" | "air_transmittance" | "sky_view" | "sky_aerial"
         | "sky_probe" | "sky_query" | "probe" => &[&[]],
-        "terrain" | "terrain_heights" => return vec![BTreeSet::new()],
+        "terrain" | "terrain_heights" | "terrain_globe" | "terrain_globe_heights" => {
+            return vec![BTreeSet::new()];
+        }
         "terrain_bake" => {
             let one = |flag: &str| BTreeSet::from([flag.to_owned()]);
             return vec![
@@ -58,7 +60,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 one("CLIP_HORIZON"),
             ];
         }
-        "terrain_rays" => {
+        "terrain_rays" | "terrain_globe_rays" => {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
         _ => &[],

@@ -26,6 +26,27 @@ pub struct TerrainLights {
 }
 
 impl TerrainLights {
+    /// Checks every light.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] that names the light, its value and what is allowed.
+    pub fn check(&self) -> Result<(), Error> {
+        for (name, light) in [
+            ("lights.sun", self.sun),
+            ("lights.sky", self.sky),
+            ("lights.bounce", self.bounce),
+        ] {
+            if !(light.is_finite() && light.min_element() >= 0.0) {
+                return Err(Error::OutOfDomain {
+                    name: name.to_owned(),
+                    value: light.to_string(),
+                    domain: "finite and at least 0".to_owned(),
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// Lights of a clear day for a sun of this irradiance, as in the preset `thesis`.
     pub fn clear(sun: Vec3) -> TerrainLights {
         TerrainLights {
@@ -43,7 +64,7 @@ pub struct TerrainOptions {
     pub preset: Preset,
     /// The ground.
     pub land: Land,
-    /// Distance at which rays end (m), in [100, 4e6].
+    /// Distance at which rays end (m), in [100, 4e6]; to 1e9 where the domain is `Sphere`.
     pub far: f64,
     /// Texels of a level's side, see [`ClipmapOptions::texels`]; 0 leaves it to the preset: 512, or 256 for `low`.
     pub texels: u32,
@@ -61,32 +82,9 @@ impl Default for TerrainOptions {
     }
 }
 
-/// Draws a height field over a host's pass, and its depth.
-///
-/// ```no_run
-/// # fn frame(device: &wgpu::Device, queue: &wgpu::Queue, encoder: &mut wgpu::CommandEncoder, target: &wgpu::TextureView, depth: &wgpu::TextureView)
-/// # -> Result<(), veduta::Error> {
-/// use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
-/// let targets = veduta::Targets { depth_format: Some(wgpu::TextureFormat::Depth32Float), ..Default::default() };
-/// let mut terrain = Terrain::new(device, veduta::programs(), &targets, &TerrainOptions::default())?;
-/// let view = veduta::View::default();
-/// // Every frame: heights are baked only where the eye has uncovered ground.
-/// let work = terrain.prepare(queue, encoder, &view, &TerrainLights::clear(view.sun.irradiance), 144)?;
-/// println!("{} levels baked", work.bakes);
-/// let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-///     color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-///         view: target, depth_slice: None, resolve_target: None, ops: wgpu::Operations::default(),
-///     })],
-///     depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-///         view: depth, depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }), stencil_ops: None,
-///     }),
-///     ..Default::default()
-/// });
-/// let _ = terrain.draw_opaque(&mut pass);
-/// # Ok(()) }
-/// ```
+/// Draws a field on the plane over a host's pass, and its depth.
 #[derive(Debug)]
-pub struct Terrain {
+pub(super) struct PlaneTerrain {
     clipmap: Clipmap,
     land: Land,
     far: f64,
@@ -101,7 +99,7 @@ pub struct Terrain {
     seen: bool,
 }
 
-impl Terrain {
+impl PlaneTerrain {
     /// Builds pipelines and makes room for heights.
     ///
     /// # Errors
@@ -111,7 +109,7 @@ impl Terrain {
         programs: &ProgramSet,
         targets: &Targets,
         options: &TerrainOptions,
-    ) -> Result<Terrain, Error> {
+    ) -> Result<PlaneTerrain, Error> {
         targets.check()?;
         if targets.projection == Projection::Orthographic {
             return Err(Error::OutOfDomain {
@@ -213,7 +211,7 @@ impl Terrain {
                 ],
             ),
         ];
-        Ok(Terrain {
+        Ok(PlaneTerrain {
             clipmap,
             land: options.land.clone(),
             far: options.far,
@@ -268,15 +266,7 @@ impl Terrain {
                 domain: domain.to_owned(),
             })
         };
-        for (name, light) in [
-            ("lights.sun", lights.sun),
-            ("lights.sky", lights.sky),
-            ("lights.bounce", lights.bounce),
-        ] {
-            if !(light.is_finite() && light.min_element() >= 0.0) {
-                return fault(name, light.to_string(), "finite and at least 0");
-            }
-        }
+        lights.check()?;
         if rows == 0 {
             return fault("rows", "0".to_owned(), "at least 1");
         }
@@ -324,6 +314,8 @@ impl Terrain {
             snow_edge_high: m.snow_edge_high,
             snow_albedo: m.snow,
             snow_noise: m.snow_noise,
+            snow_line: m.snow_line,
+            ..Default::default()
         };
         let wavelength = f64::from(m.rock_wavelength);
         let [x, z] = [eye.lattice(0, wavelength)?, eye.lattice(2, wavelength)?];
@@ -335,7 +327,7 @@ impl Terrain {
             hurst: 1.0,
             dark: m.rock_dark,
             light: m.rock_light,
-            stain: m.rock_dark.map(|c| 0.6 * c),
+            stain: m.rock_dark.map(|c| m.rock_stain * c),
             seed: self.land.field.seed.wrapping_add(101),
             ..Default::default()
         };

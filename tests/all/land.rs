@@ -138,7 +138,7 @@ fn rays_over_baked_heights_meet_the_field() {
 }
 
 /// A drawn picture, four numbers a pixel, its depths, and what was recorded.
-fn drawn(
+pub fn drawn(
     terrain: &veduta::terrain::Terrain,
     columns: usize,
     rows: usize,

@@ -33,6 +33,8 @@ struct TerrainView {
     snow_edge_high: f32,
     snow_albedo: vec3<f32>,
     snow_noise: f32,
+    // Height below which no snow lies [m].
+    snow_line: f32,
 }
 
 @group(0) @binding(0) var<uniform> draw_view: TerrainView;
@@ -170,7 +172,8 @@ fn draw(in: Corner) -> Shown {
     let lost = found.ground.lost;
     let level = inverseSqrt(1.0 + dot(slope, slope) + lost);
     let blur = 0.5 * level * level * sqrt(lost * (1.0 - level * level));
-    let snow = snow_blend(level, border, draw_view.snow_edge_low - blur, draw_view.snow_edge_high + blur, draw_view.snow_noise);
+    let high = smoothstep(draw_view.snow_line - 100.0, draw_view.snow_line + 100.0, altitude + 200.0 * border);
+    let snow = high * snow_blend(level, border, draw_view.snow_edge_low - blur, draw_view.snow_edge_high + blur, draw_view.snow_noise);
     albedo = mix(albedo, draw_view.snow_albedo, snow);
     let lights = ThreeLights(draw_view.sun_light, draw_view.sky_light, draw_view.bounce_light);
     let radiance = INVERSE_PI * albedo * shade_rough(lights, slope, lost, draw_view.to_sun, light);
