@@ -107,7 +107,7 @@ impl<T: Real> Globe<T> {
     }
 
     /// From the planet's centre (m).
-    fn from_centre(&self, position: WorldPos) -> [f64; 3] {
+    fn out_from_centre(&self, position: WorldPos) -> [f64; 3] {
         let p = position.to_metres();
         [p.x, p.y + self.radius, p.z]
     }
@@ -133,14 +133,14 @@ impl<T: Real> Globe<T> {
 
     /// The point on the ball of the planet's radius below or above a position, from the centre (m).
     pub(super) fn foot(&self, position: WorldPos) -> [f64; 3] {
-        let out = self.from_centre(position);
+        let out = self.out_from_centre(position);
         let length = dot(out, out).sqrt();
         out.map(|c| c * (self.radius / length.max(1e-30)))
     }
 
     /// Where a position lies on the ball.
     pub fn place(&self, position: WorldPos) -> GlobePlace<T> {
-        self.place_of(self.from_centre(position))
+        self.place_of(self.out_from_centre(position))
     }
 
     fn place_of(&self, from_centre: [f64; 3]) -> GlobePlace<T> {
@@ -319,7 +319,7 @@ impl<T: Real> Globe<T> {
         least: f64,
     ) -> Result<TerrainHit, Error> {
         ray.check(0)?;
-        let eye = self.from_centre(ray.origin);
+        let eye = self.out_from_centre(ray.origin);
         let start = self.altitude(ray.origin);
         let radius = self.radius + start;
         let mu = dot(eye, ray.dir) / radius;

@@ -240,7 +240,6 @@ impl GlobeTerrain {
             sea_albedo: self.land.sea.map_or([0.0; 3], |s| s.albedo),
             rim_cosine: rim_cosine as f32,
             lights: std::array::from_fn(by_height),
-            ..Default::default()
         };
         // The rock's lattice has the world's axes, too, from the eye's foot point.
         let foot = self.globe.foot(eye);

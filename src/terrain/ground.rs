@@ -81,7 +81,7 @@ fn strata<T: Real>(value: T, period: T, hardness: T, variance: T) -> [T; 3] {
         + T::of(0.16) * (one - e_nine * e_nine)
         + T::of(0.04) * (one - e_sixteen * e_sixteen);
     [
-        value + T::of(0.31830989) * hardness * period * wave,
+        value + T::of(std::f64::consts::FRAC_1_PI) * hardness * period * wave,
         one + two * hardness * slope,
         two * hardness * hardness * spread,
     ]

@@ -133,7 +133,7 @@ fn strata(value: f32, period: f32, hardness: f32, variance: f32) -> vec3<f32> {
     let wave = 0.8 * e * sine + 0.3 * e_four * sine_two + 0.13333333 * e_nine * sine_three + 0.05 * e_sixteen * sine_four;
     let slope = 0.8 * e * cosine + 0.6 * e_four * cosine_two + 0.4 * e_nine * cosine_three + 0.2 * e_sixteen * cosine_four;
     let spread = 0.64 * (1.0 - e * e) + 0.36 * (1.0 - e_four * e_four) + 0.16 * (1.0 - e_nine * e_nine) + 0.04 * (1.0 - e_sixteen * e_sixteen);
-    return vec3<f32>(value + 0.31830989 * hardness * period * wave, 1.0 + 2.0 * hardness * slope, 2.0 * hardness * hardness * spread);
+    return vec3<f32>(value + 0.31830988618 * hardness * period * wave, 1.0 + 2.0 * hardness * slope, 2.0 * hardness * hardness * spread);
 }
 
 /// The sum over octaves for all kinds but the mix.

@@ -116,8 +116,10 @@ fn ball_crater(x: f32, square: f32) -> vec2<f32> {
 /// internal
 fn crater_cells_3d(p: Lattice3d, up: vec3<f32>, radius: f32, share: f32, seed: u32) -> vec4<f32> {
     var sum = vec4<f32>(0.0);
-    for (var k = 0; k < 27; k++) {
-        let step = vec3<i32>(k % 3 - 1, (k / 3) % 3 - 1, k / 9 - 1);
+    // No crater reaches farther than 0.72 cells from its middle, and that lies 0.25 within its cell: of three cells in a row the farthest has none.
+    let low = select(vec3<i32>(-1), vec3<i32>(0), p.frac >= vec3<f32>(0.5));
+    for (var k = 0; k < 8; k++) {
+        let step = low + vec3<i32>(k & 1, (k >> 1u) & 1, k >> 2u);
         let words = lattice_hash_3d(p.cell + step, seed);
         let jitter = vec3<f32>(words & vec3<u32>(0xffffu)) * 7.62939453125e-6 + 0.25;
         let chance = f32(words.x >> 16u) * 1.52587890625e-5;
@@ -259,7 +261,7 @@ fn globe_octaves(globe: Globe, kind: i32, cell: vec3<i32>, frac: vec3<f32>, up: 
 /// domain  up in [-1, 1] 1 lin
 /// domain  footprint in [1e-3, 1e5] m log
 /// range   [-1e5, 1e5] 1
-/// error   5e-2 abs of reference::globe::ground
+/// error   8e-3 abs of reference::globe::ground
 /// outside undefined
 /// source  Leitner2022 alg. 1 to 3; the filter and the ball: ours
 fn globe_ground(globe: Globe, kind: i32, cell: vec3<i32>, frac: vec3<f32>, up: vec3<f32>, footprint: f32) -> GlobeGround {
@@ -277,7 +279,7 @@ fn globe_frac(globe: Globe, at: vec3<f32>, altitude: f32) -> vec3<f32> {
 /// The field below or above a place.
 ///
 /// domain  kind in [0, 2] 1 lin
-/// domain  at in [-1e6, 1e6] m lin
+/// domain  at in [-2e5, 2e5] m lin
 /// domain  footprint in [1e-3, 1e5] m log
 /// range   [-1e5, 1e5] 1
 /// error   1 abs of reference::globe::ground_from
