@@ -66,6 +66,8 @@ pub struct TerrainOptions {
     pub land: Land,
     /// Distance at which rays end (m), in [100, 4e6]; to 1e9 where the domain is `Sphere`.
     pub far: f64,
+    /// Sectors in which the horizons around a place take light off the sky (ambient occlusion), in [0, 16]; 0 leaves all of it. Nothing comes of it over a ball.
+    pub sky_sectors: u32,
     /// Texels of a level's side, see [`ClipmapOptions::texels`]; 0 leaves it to the preset: 512, or 256 for `low`.
     pub texels: u32,
 }
@@ -77,6 +79,7 @@ impl Default for TerrainOptions {
             preset: Preset::High,
             land: Land::default(),
             far: 60_000.0,
+            sky_sectors: 0,
             texels: 0,
         }
     }
@@ -125,6 +128,13 @@ impl PlaneTerrain {
                 domain: "the format of a depth buffer, which the terrain writes".to_owned(),
             });
         };
+        if options.sky_sectors > 16 {
+            return Err(Error::OutOfDomain {
+                name: "terrain.sky_sectors".to_owned(),
+                value: options.sky_sectors.to_string(),
+                domain: "in [0, 16]".to_owned(),
+            });
+        }
         let output = output_of(targets.color_format)?;
         let settings = Settings::resolve(programs, &options.preset, None, &[])?;
         let low = settings.number("TEXTURE_LOW_QUALITY").unwrap_or(0.0) != 0.0;
@@ -150,6 +160,7 @@ impl PlaneTerrain {
             ("MAX_MARCHING_STEPS_SHADOW", if low { 24.0 } else { 60.0 }),
             ("REFINE_STEPS", if low { 1.0 } else { 2.0 }),
             ("ROCK_CHEAP", f64::from(u8::from(low))),
+            ("SKY_SECTORS", f64::from(options.sky_sectors)),
         ];
         let ready = programs.get("terrain", &[])?.pipeline(
             device,

@@ -60,6 +60,9 @@ pub struct LandArgs {
     /// Distance at which rays end in metres, 100 to 4e6, 1e5 when left out; over a ball up to 1e9, and not before when left out
     #[arg(long)]
     pub far: Option<f64>,
+    /// Sectors in which the horizons around a place take light off the sky, 0 to 16
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=16))]
+    pub sky_sectors: u32,
     /// Width and height of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "256x144")]
     pub size: Size,
@@ -178,6 +181,7 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
         preset: preset.clone(),
         land,
         far,
+        sky_sectors: args.sky_sectors,
         ..Default::default()
     };
     let mut terrain = Terrain::new(device, veduta::programs(), &targets, &options)?;

@@ -54,6 +54,10 @@ impl Values {
 /// Functions that read textures, each with the test of `tests/all` that judges it on the device.
 pub const ELSEWHERE: &[(&str, &str)] = &[
     (
+        "veduta::terrain::sky_share::sky_share",
+        "valleys_see_less_of_the_sky",
+    ),
+    (
         "veduta::terrain::clipmap::baked_height",
         "rays_over_baked_heights_meet_the_field",
     ),
