@@ -213,6 +213,28 @@ impl View {
         self.projection = perspective(vertical_field_of_view, aspect);
     }
 
+    /// The same view, when the planet's centre lies at (0, -radius, 0) of the world and the eye anywhere, in a frame with +Y up at the eye: the eye stands at (0, altitude, 0).
+    /// Depths stay as they are. The previous frame is left out.
+    pub fn levelled(&self, planet_radius: f64) -> View {
+        let p = self.eye.to_metres();
+        let out = DVec3::new(p.x, p.y + planet_radius, p.z);
+        let q = p.length_squared() + 2.0 * planet_radius * p.y;
+        let altitude = q / (planet_radius + (planet_radius * planet_radius + q).max(0.0).sqrt());
+        let turn = glam::DQuat::from_rotation_arc(out.normalize_or(DVec3::Y), DVec3::Y);
+        let light = |light: &Light| Light {
+            to_light: (turn * light.to_light.as_dvec3()).as_vec3(),
+            ..*light
+        };
+        View {
+            eye: WorldPos::from_metres(DVec3::new(0.0, altitude, 0.0)),
+            world_from_view: Mat4::from_quat(turn.as_quat()) * self.world_from_view,
+            sun: light(&self.sun),
+            moon: self.moon.as_ref().map(light),
+            previous: None,
+            ..*self
+        }
+    }
+
     /// Checks every field.
     ///
     /// # Errors

@@ -48,7 +48,9 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         ],
         "air_columns" | "air_diffuse" | "air_transmittance" | "sky_view" | "sky_refine"
         | "sky_aerial" | "sky_probe" | "sky_query" | "probe" => &[&[]],
-        "terrain" | "terrain_heights" => return vec![BTreeSet::new()],
+        "terrain" | "terrain_heights" | "terrain_globe" | "terrain_globe_heights" => {
+            return vec![BTreeSet::new()];
+        }
         "terrain_bake" => {
             return vec![
                 BTreeSet::new(),
@@ -56,7 +58,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 BTreeSet::from(["CLIP_SHADES".to_owned()]),
             ];
         }
-        "terrain_rays" => {
+        "terrain_rays" | "terrain_globe_rays" => {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
         _ => &[],

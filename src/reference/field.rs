@@ -54,21 +54,21 @@ pub fn kept(wavelength: f64, footprint: f64) -> f64 {
 }
 
 /// What is left of a series after so many of its terms; the hybrid's is a geometric sequence.
-fn remainder(kind: i32, [total, first, ratio, _]: [f64; 4], terms: i32) -> f64 {
+pub(super) fn remainder(kind: i32, [total, first, ratio, _]: [f64; 4], terms: i32) -> f64 {
     if kind == 1 {
         return total * ratio.powi(terms);
     }
     total - (0..terms).map(|i| first * ratio.powi(i)).sum::<f64>()
 }
 
-/// Profile of a crater and its slope.
-fn crater(x: f64) -> [f64; 2] {
+/// Profile of a crater and its slope; `outside` is how far its ejecta reach beyond the rim.
+pub(super) fn crater(x: f64, outside: f64) -> [f64; 2] {
     let mut all = [0.0; 2];
     if x < 1.0 {
         all[0] -= 0.4 * (1.0 - x * x).powi(2);
         all[1] += 1.6 * x * (1.0 - x * x);
     }
-    let width = if x < 1.0 { 0.4 } else { 1.0 };
+    let width = if x < 1.0 { 0.4 } else { outside };
     let y = (x - 1.0) / width;
     if y.abs() < 1.0 {
         all[0] += 0.08 * (1.0 - y * y).powi(2);
@@ -95,7 +95,7 @@ fn crater_octave(field: &Field, cell: [i32; 2], frac: [f64; 2], i: i32) -> [f64;
                 p.frac[1] - f64::from(dy) - middle[1],
             ];
             let distance = away[0].hypot(away[1]);
-            let [value, slope] = crater(distance / radius);
+            let [value, slope] = crater(distance / radius, 1.0);
             sum[0] += radius * value;
             for k in 0..2 {
                 // The middle of a bowl is level.
@@ -155,12 +155,64 @@ fn first_octaves(
     [sum, if weight[0] >= 1.0 { one } else { weight }]
 }
 
+/// The strata's mean over values with a variance, its slope, and the variance of its slope.
+fn strata(value: f64, period: f64, hardness: f64, variance: f64) -> [f64; 3] {
+    use std::f64::consts::{PI, TAU};
+    let mut all = [value, 1.0, 0.0];
+    for j in 1..=4 {
+        let (j, weight) = (f64::from(j), 1.0 - f64::from(j) / 5.0);
+        let turn = TAU * j / period;
+        // A Gaussian's effect on a wave, exp(-y), as the device has it.
+        let left = (1.0 + (TAU / period).powi(2) * variance / 32.0).powf(-16.0 * j * j);
+        all[0] += hardness * period * weight / (PI * j) * left * (turn * value).sin();
+        all[1] += 2.0 * hardness * weight * left * (turn * value).cos();
+        all[2] += 2.0 * (hardness * weight).powi(2) * (1.0 - left * left);
+    }
+    all
+}
+
+/// An fBm in strata: values vary by what is left out, and within the footprint by the slopes that are not.
+fn mesa(field: &Field, cell: [i32; 2], frac: [f64; 2], footprint: f64) -> Ground {
+    let hurst = -field.fall.log2();
+    let mut value = [0.0; 3];
+    let (mut variance, mut lost) = (field.mean[0], field.lost[0]);
+    for i in 0..field.octaves {
+        let keep = kept(field.wavelength / octave_frequency(i), footprint);
+        let n = octave_noise_2d(cell, frac, i, field.seed);
+        for a in 0..3 {
+            value[a] += keep * octave_amplitude(i, hurst) * n[a];
+        }
+        variance -= keep * keep * field.mean[1] * field.mean[2].powi(i);
+        lost -= keep * keep * field.lost[1] * field.lost[2].powi(i);
+    }
+    if kept(
+        field.wavelength / octave_frequency(field.octaves - 1),
+        footprint,
+    ) >= 1.0
+    {
+        (variance, lost) = (0.0, 0.0);
+    }
+    let within = (footprint / field.wavelength).powi(2) / 12.0 * (field.lost[0] - lost).max(0.0);
+    let [height, slope, spread] = strata(
+        value[0],
+        field.shape,
+        field.detail,
+        variance.max(0.0) + within,
+    );
+    let square = value[1] * value[1] + value[2] * value[2];
+    let lost = lost.max(0.0) * (slope * slope + spread) + spread * square;
+    scaled(field, [height, slope * value[1], slope * value[2]], lost)
+}
+
 /// The field at an offset (x, z) from the eye, filtered by a footprint.
 pub fn ground(field: &Field, kind: i32, offset: [f64; 2], footprint: f64) -> Ground {
     let place: [f64; 2] = std::array::from_fn(|k| field.frac[k] + offset[k] / field.wavelength);
     let p = split_2d(field.cell, place);
     if kind == 4 {
         return mix(field, p.cell, p.frac, footprint);
+    }
+    if kind == 6 {
+        return mesa(field, p.cell, p.frac, footprint);
     }
     let share = |i: i32| kept(field.wavelength / octave_frequency(i), footprint);
     let whole = (0..field.octaves).take_while(|i| share(*i) >= 1.0).count() as i32;

@@ -10,6 +10,7 @@ pub mod atmosphere;
 pub mod clouds;
 pub mod field;
 pub mod fractal;
+pub mod globe;
 pub mod hash;
 pub mod intersect;
 pub mod math;

@@ -536,3 +536,31 @@ pub fn surface_footprint(
 pub fn snow_blend(normal_y: f64, noise: f64, edge0: f64, edge1: f64, k: f64) -> f64 {
     1.0 - smoothstep((edge0 + k * noise).min(edge1 - 0.01), edge1, 1.0 - normal_y)
 }
+
+/// Irradiance of a uniform sky on the ground between horizons, over that on level ground and the normal's zenith cosine: horizons in so many sectors, of heights at so many
+/// distances, each longer by a factor.
+#[allow(clippy::too_many_arguments)]
+pub fn sky_share(
+    height: impl Fn([f64; 2]) -> f64,
+    at: [f64; 2],
+    altitude: f64,
+    slope: [f64; 2],
+    first: f64,
+    factor: f64,
+    rings: i32,
+    sectors: i32,
+) -> f64 {
+    let mut sum = 0.0;
+    for i in 0..sectors {
+        let turn = std::f64::consts::TAU * (f64::from(i) + 0.5) / f64::from(sectors);
+        let (sine, cosine) = turn.sin_cos();
+        let g = slope[0] * cosine + slope[1] * sine;
+        let tangent = (0..rings).fold(g.max(0.0), |most, k| {
+            let t = first * factor.powi(k);
+            most.max((height([at[0] + cosine * t, at[1] + sine * t]) - altitude) / t)
+        });
+        let square = 1.0 / (1.0 + tangent * tangent);
+        sum += square - g * (std::f64::consts::FRAC_PI_2 - tangent.atan() - tangent * square);
+    }
+    sum.max(0.0) / f64::from(sectors)
+}

@@ -2,8 +2,9 @@
 
 use std::sync::OnceLock;
 
-use super::field::{HeightField, Kind};
+use super::field::{Domain, HeightField, Kind};
 use super::noise::{Place, craters, gradient_noise};
+use super::noise_3d::{Place3d, craters_3d, gradient_noise_3d};
 
 /// The sum of a geometric series over the octaves left, and its bend with the weight: see `veduta::terrain::field`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -54,6 +55,42 @@ fn noise() -> &'static [Sample] {
     NOISE.get_or_init(|| {
         places()
             .map(|(place, seed)| sample(gradient_noise(place, seed)))
+            .collect()
+    })
+}
+
+/// Places spread evenly over random cells in 3D, each with a random way that is up.
+fn places_3d() -> impl Iterator<Item = (Place3d<f64>, [f64; 3], u32)> {
+    (0..SAMPLES as i32).map(|i| {
+        // Roberts' additive recurrence in five dimensions.
+        let at = |step: f64| (f64::from(i) * step).fract();
+        let place = Place3d {
+            cell: [7919, -104_729, 15_485_863].map(|n: i32| i.wrapping_mul(n)),
+            frac: [
+                at(0.881_271_407_148_6),
+                at(0.776_639_293_066_8),
+                at(0.684_430_002_545_2),
+            ],
+        };
+        let (height, turn) = (2.0 * at(0.603_168_596_9) - 1.0, at(0.531_555_235));
+        let level = (1.0 - height * height).sqrt();
+        let (sine, cosine) = (std::f64::consts::TAU * turn).sin_cos();
+        let up = [level * cosine, height, level * sine];
+        (place, up, i.cast_unsigned().wrapping_mul(0x85eb_ca6b))
+    })
+}
+
+/// Value, and square of the slope across `up`.
+fn sample_3d([value, x, y, z]: [f64; 4], up: [f64; 3]) -> Sample {
+    let along = x * up[0] + y * up[1] + z * up[2];
+    [value, x * x + y * y + z * z - along * along]
+}
+
+fn noise_3d() -> &'static [Sample] {
+    static NOISE: OnceLock<Vec<Sample>> = OnceLock::new();
+    NOISE.get_or_init(|| {
+        places_3d()
+            .map(|(place, up, seed)| sample_3d(gradient_noise_3d(place, seed), up))
             .collect()
     })
 }
@@ -144,7 +181,11 @@ fn sequence(sums: &[Curve]) -> Tail {
 pub fn tails(field: &HeightField) -> Tails {
     let octaves = field.octaves as i32;
     let fall = |i: i32| (-field.hurst * f64::from(i)).exp2();
-    let mean_square = noise().iter().map(|s| s[1]).sum::<f64>() / SAMPLES as f64;
+    let basis = match field.domain {
+        Domain::Plane => noise(),
+        Domain::Sphere => noise_3d(),
+    };
+    let mean_square = basis.iter().map(|s| s[1]).sum::<f64>() / SAMPLES as f64;
     let ratio = 4.0 * fall(2);
     let series = |count: i32, frequency: f64| {
         mean_square * frequency * frequency * (0..count).map(|i| ratio.powi(i)).sum::<f64>()
@@ -166,6 +207,20 @@ pub fn tails(field: &HeightField) -> Tails {
             };
             return Tails { mean, lost };
         }
+        Kind::Mesa { .. } => {
+            // In the mean's place stands the variance of the values that are left out.
+            let own = basis.iter().map(|s| s[0] * s[0]).sum::<f64>() / SAMPLES as f64;
+            let sum = |first: f64, ratio: f64| Tail {
+                total: first * (0..octaves).map(|i| ratio.powi(i)).sum::<f64>(),
+                first,
+                ratio,
+                bend: 0.0,
+            };
+            return Tails {
+                mean: sum(own, fall(2)),
+                lost: sum(mean_square, ratio),
+            };
+        }
         Kind::Fbm => {
             let lost = Tail {
                 total: series(octaves, 1.0),
@@ -175,6 +230,17 @@ pub fn tails(field: &HeightField) -> Tails {
             };
             let mean = Tail::default();
             return Tails { mean, lost };
+        }
+        Kind::Craters { share, roughness } if field.domain == Domain::Sphere => {
+            own = places_3d()
+                .map(|(place, up, seed)| {
+                    let bowls = craters_3d(place, up, 1000.0, share, seed);
+                    let between = gradient_noise_3d(place, seed);
+                    let both = std::array::from_fn(|k| bowls[k] + roughness * between[k]);
+                    sample_3d(both, up)
+                })
+                .collect();
+            &own[..]
         }
         Kind::Craters { share, roughness } => {
             own = places()
@@ -186,7 +252,7 @@ pub fn tails(field: &HeightField) -> Tails {
                 .collect();
             &own[..]
         }
-        Kind::Hybrid { .. } | Kind::Ridged { .. } => noise(),
+        Kind::Hybrid { .. } | Kind::Ridged { .. } => basis,
     };
     let [shape, detail] = field.kind.parameters();
     // What octave i adds for a weight and a noise, its change with the noise, the weight of the next and its change.

@@ -14,6 +14,10 @@ pub enum Domain {
     /// x and z on an endless integer lattice.
     #[default]
     Plane,
+    /// Noise in 3D, on an integer lattice, of the direction from the planet's centre times its radius: a ball that is seen from orbit. [`Land::globe`] prepares it.
+    ///
+    /// [`Land::globe`]: super::Land::globe
+    Sphere,
 }
 
 /// What the field is made of.
@@ -48,6 +52,13 @@ pub enum Kind {
         /// Power of the mountains, whole, in [1, 6].
         mountains: f64,
     },
+    /// An fBm in strata: benches and cliffs, as in mesa and canyon land.
+    Mesa {
+        /// Thickness of a stratum in amplitudes, in [0.02, 2].
+        strata: f64,
+        /// How flat benches are and how steep cliffs, in [0, 1]; 0 is an fBm, 1 makes cliffs five times as steep as that.
+        hardness: f64,
+    },
     /// The program's own WGSL function, put in the place of `veduta::terrain::height::height`. It has no bounds, and no height on the processor.
     Own {
         /// Handed on as the terrain's gain.
@@ -67,6 +78,7 @@ impl Kind {
             Kind::Craters { .. } => 3,
             Kind::Mix { .. } => 4,
             Kind::Own { .. } => 5,
+            Kind::Mesa { .. } => 6,
         }
     }
 
@@ -80,6 +92,7 @@ impl Kind {
             }
             Kind::Craters { share, roughness } => [share, roughness],
             Kind::Mix { mountains } => [mountains, 0.0],
+            Kind::Mesa { strata, hardness } => [strata, hardness],
         }
     }
 }
@@ -155,6 +168,9 @@ pub struct Bounds {
 /// No gradient noise in 2D has a steeper slope, per cell: the largest over all places and vectors is 2.9262.
 const NOISE_SLOPE: f64 = 2.927;
 
+/// The same in 3D, found by a search over places and directions, with the steepest of the 24 vectors at every corner: 3.5869.
+const NOISE_SLOPE_3D: f64 = 3.588;
+
 /// The interval of a product.
 fn product([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
     let all = [a * c, a * d, b * c, b * d];
@@ -165,12 +181,12 @@ fn product([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
 }
 
 /// Bounds of the value and of the slope per cell of every octave, for an fBm of so many octaves from a frequency on.
-fn fbm_bounds(octaves: u32, hurst: f64, frequency: f64) -> (f64, Vec<f64>) {
+fn fbm_bounds(octaves: u32, hurst: f64, frequency: f64, steep: f64) -> (f64, Vec<f64>) {
     let amplitude = |i: u32| (-hurst * f64::from(i)).exp2();
     (
         (0..octaves).map(amplitude).sum(),
         (0..octaves)
-            .map(|i| NOISE_SLOPE * amplitude(i) * frequency * f64::from(i).exp2())
+            .map(|i| steep * amplitude(i) * frequency * f64::from(i).exp2())
             .collect(),
     )
 }
@@ -196,6 +212,15 @@ impl HeightField {
         within("base", self.base, -2e4, 2e4, " m")?;
         within("octaves", f64::from(self.octaves), 1.0, 16.0, "")?;
         within("hurst", self.hurst, 0.0, 2.0, "")?;
+        if let (Domain::Sphere, Kind::Mix { .. } | Kind::Own { .. } | Kind::Mesa { .. }) =
+            (self.domain, self.kind)
+        {
+            return Err(Error::OutOfDomain {
+                name: "field.kind".to_owned(),
+                value: format!("{:?}", self.kind),
+                domain: "Fbm, Hybrid, Ridged or Craters on a Sphere".to_owned(),
+            });
+        }
         match self.kind {
             Kind::Fbm => Ok(()),
             Kind::Hybrid { offset } => within("kind.offset", offset, 0.0, 1.0, ""),
@@ -206,6 +231,10 @@ impl HeightField {
             Kind::Craters { share, roughness } => {
                 within("kind.share", share, 0.0, 1.0, "")?;
                 within("kind.roughness", roughness, 0.0, 1.0, "")
+            }
+            Kind::Mesa { strata, hardness } => {
+                within("kind.strata", strata, 0.02, 2.0, "")?;
+                within("kind.hardness", hardness, 0.0, 1.0, "")
             }
             Kind::Mix { mountains } => {
                 within("kind.mountains", mountains, 1.0, 6.0, "")?;
@@ -233,9 +262,16 @@ impl HeightField {
     /// The field with all that follows from its numbers, in `f32` as the device computes it, or in `f64`.
     ///
     /// # Errors
-    /// As [`HeightField::check`].
+    /// As [`HeightField::check`]; [`Error::OutOfDomain`] on a `Sphere`, which `Land::globe` prepares, since it needs the planet's radius.
     pub fn prepare<T: Real>(&self) -> Result<Prepared<T>, Error> {
         self.check()?;
+        if self.domain != Domain::Plane {
+            return Err(Error::OutOfDomain {
+                name: "field.domain".to_owned(),
+                value: format!("{:?}", self.domain),
+                domain: "Plane; Land::globe takes a Sphere".to_owned(),
+            });
+        }
         Ok(Prepared::new(self, &calibrate::tails(self)))
     }
 
@@ -248,17 +284,28 @@ impl HeightField {
         let fall = |i: u32| (-self.hurst * f64::from(i)).exp2();
         let frequency = |i: u32| f64::from(i).exp2();
         let (mut values, mut slopes) = ([0.0_f64; 2], Vec::new());
+        // The steepest noise, and how many bowls and rims of a lattice can meet in a point, and the largest radius.
+        let (steep_noise, bowls, rims, largest) = match self.domain {
+            Domain::Plane => (NOISE_SLOPE, 4.0, 9.0, 0.4),
+            Domain::Sphere => (NOISE_SLOPE_3D, 8.0, 8.0, 0.35),
+        };
         match self.kind {
             Kind::Fbm => {
-                let (sum, each) = fbm_bounds(self.octaves, self.hurst, 1.0);
+                let (sum, each) = fbm_bounds(self.octaves, self.hurst, 1.0, steep_noise);
                 (values, slopes) = ([-sum, sum], each);
             }
+            Kind::Mesa { strata, hardness } => {
+                let (sum, each) = fbm_bounds(self.octaves, self.hurst, 1.0, steep_noise);
+                // The waves of the strata at their greatest, and with all slopes joined.
+                let most = sum + hardness * strata * std::f64::consts::FRAC_1_PI * 1.284;
+                values = [-most, most];
+                slopes = each.iter().map(|s| s * (1.0 + 4.0 * hardness)).collect();
+            }
             Kind::Craters { roughness, .. } => {
-                // At most four bowls and nine rims meet in a point.
                 for i in 0..self.octaves {
-                    values[0] -= fall(i) * (4.0 * 0.4 * 0.4 + roughness);
-                    values[1] += fall(i) * (9.0 * 0.4 * 0.08 + roughness);
-                    let slope = 4.0 * 0.93 + 5.0 * 0.13 + roughness * NOISE_SLOPE;
+                    values[0] -= fall(i) * (bowls * 0.4 * largest + roughness);
+                    values[1] += fall(i) * (rims * largest * 0.08 + roughness);
+                    let slope = bowls * 0.93 + (rims - bowls) * 0.13 + roughness * steep_noise;
                     slopes.push(fall(i) * frequency(i) * slope);
                 }
             }
@@ -268,7 +315,7 @@ impl HeightField {
                     let a = fall(i);
                     let signal = [a * (offset - 1.0), a * (offset + 1.0)];
                     let most = weight[0].abs().max(weight[1].abs());
-                    steep = most * a * frequency(i) * NOISE_SLOPE + signal[1] * steep;
+                    steep = most * a * frequency(i) * steep_noise + signal[1] * steep;
                     weight = product(weight, signal);
                     values = [values[0] + weight[0], values[1] + weight[1]];
                     slopes.push(steep);
@@ -282,19 +329,19 @@ impl HeightField {
                 let mut steep = 0.0;
                 for i in 0..self.octaves {
                     // |d ridge^2| is at most 2 |ridge| |dn|.
-                    steep = 2.0 * most.sqrt() * frequency(i) * NOISE_SLOPE + most * gain * steep;
+                    steep = 2.0 * most.sqrt() * frequency(i) * steep_noise + most * gain * steep;
                     slopes.push(fall(i) * steep);
                     values[1] += fall(i) * most;
                 }
             }
             Kind::Mix { mountains } => {
-                let (fine, fine_slopes) = fbm_bounds(self.octaves, self.hurst, 8.0);
-                let (middle, middle_slopes) = fbm_bounds(3, self.hurst, 4.0);
+                let (fine, fine_slopes) = fbm_bounds(self.octaves, self.hurst, 8.0, steep_noise);
+                let (middle, middle_slopes) = fbm_bounds(3, self.hurst, 4.0, steep_noise);
                 let lift = (1.0 + middle).powf(mountains);
                 let sum = 0.1 * fine * lift + 0.2 * middle + 1.0;
                 values = [-sum, sum];
                 let bend = 0.1 * fine * mountains * (1.0 + middle).powf(mountains - 1.0) + 0.2;
-                slopes.push(NOISE_SLOPE);
+                slopes.push(steep_noise);
                 slopes.extend(middle_slopes.iter().map(|s| s * bend));
                 slopes.extend(fine_slopes.iter().map(|s| s * 0.1 * lift));
             }
@@ -314,6 +361,22 @@ impl HeightField {
             lipschitz: octaves.iter().sum(),
             octaves,
         })
+    }
+
+    /// What an octave adds to the height at most, per amplitude.
+    pub(super) fn tallest(&self) -> f64 {
+        match self.kind {
+            Kind::Hybrid { offset } => 1.0 + offset,
+            Kind::Ridged { smoothness, .. } => {
+                let deep = (1.0 - (1.0 + smoothness).sqrt()).powi(2);
+                (1.0 - smoothness.sqrt()).powi(2).max(deep)
+            }
+            Kind::Craters { roughness, .. } => match self.domain {
+                Domain::Plane => 9.0 * 0.4 * 0.08 + roughness,
+                Domain::Sphere => 8.0 * 0.35 * 0.08 + roughness,
+            },
+            _ => 1.0,
+        }
     }
 
     /// Reads a field from RON, for instance `(kind: Ridged(gain: 2, smoothness: 0), wavelength: 8192, amplitude: 1400, octaves: 10, hurst: 1)`.

@@ -27,6 +27,66 @@ impl<T: Real> Ground<T> {
     }
 }
 
+/// What strata make of a value of a given variance: the mean, its slope, and what its slope's square varies by.
+fn strata<T: Real>(value: T, period: T, hardness: T, variance: T) -> [T; 3] {
+    let (one, two) = (T::of(1.0), T::of(2.0));
+    let turn = value / period;
+    let r = turn - (turn + T::of(0.5)).whole();
+    let q = r * r;
+    let series = |all: &[f64]| {
+        all.iter()
+            .skip(1)
+            .fold(T::of(all[0]), |sum, c| sum * q + T::of(*c))
+    };
+    let s = r * series(&[
+        0.0772201193526,
+        -0.598045169271,
+        2.55003137647,
+        -5.16770687888,
+        3.14159258004,
+    ]);
+    let c = series(&[
+        -0.0243967164202,
+        0.234937559128,
+        -1.33521205679,
+        4.05870916436,
+        -4.93480213723,
+        0.999999999781,
+    ]);
+    let sine = two * s * c;
+    let cosine = one - two * s * s;
+    let base = one / (one + T::of(1.23370055) * variance / (period * period));
+    let power = |x: T| x * x;
+    let e = power(power(power(power(base))));
+    let e_four = power(power(e));
+    let e_eight = power(e_four);
+    let e_nine = e_eight * e;
+    let e_sixteen = power(e_eight);
+    let sine_two = two * cosine * sine;
+    let cosine_two = two * cosine * cosine - one;
+    let sine_three = two * cosine * sine_two - sine;
+    let cosine_three = two * cosine * cosine_two - cosine;
+    let sine_four = two * cosine * sine_three - sine_two;
+    let cosine_four = two * cosine * cosine_three - cosine_two;
+    let wave = T::of(0.8) * e * sine
+        + T::of(0.3) * e_four * sine_two
+        + T::of(0.13333333) * e_nine * sine_three
+        + T::of(0.05) * e_sixteen * sine_four;
+    let slope = T::of(0.8) * e * cosine
+        + T::of(0.6) * e_four * cosine_two
+        + T::of(0.4) * e_nine * cosine_three
+        + T::of(0.2) * e_sixteen * cosine_four;
+    let spread = T::of(0.64) * (one - e * e)
+        + T::of(0.36) * (one - e_four * e_four)
+        + T::of(0.16) * (one - e_nine * e_nine)
+        + T::of(0.04) * (one - e_sixteen * e_sixteen);
+    [
+        value + T::of(std::f64::consts::FRAC_1_PI) * hardness * period * wave,
+        one + two * hardness * slope,
+        two * hardness * hardness * spread,
+    ]
+}
+
 /// A field with all that follows from its numbers. In `f32` it does what the device does, operation by operation; see [`HeightField::prepare`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prepared<T> {
@@ -141,7 +201,10 @@ impl<T: Real> Prepared<T> {
         let mut sum = [zero; 3];
         let [mut tail, mut tail_step, ..] = self.mean;
         let [mut rough, mut rough_step, ..] = self.lost;
-        let mut mean = [tail, zero, zero];
+        let mesa = matches!(self.kind, Kind::Mesa { .. });
+        // The mesa follows the variance of what is left in the place of its mean, which is 0.
+        let mut mean = [if mesa { zero } else { tail }, zero, zero];
+        let mut variance = tail;
         let mut lost = rough;
         for i in 0..self.octaves {
             if reach <= one {
@@ -215,8 +278,9 @@ impl<T: Real> Prepared<T> {
             amplitude *= self.fall;
             reach *= T::of(0.5);
             let left = if i + 1 == self.octaves { zero } else { one };
-            let rest = left * tail * (one + self.mean[3] * (one - weight[0]));
-            let slope = left * tail * (one + self.mean[3] * (one - two * weight[0]));
+            let means = if mesa { zero } else { left * tail };
+            let rest = means * (one + self.mean[3] * (one - weight[0]));
+            let slope = means * (one + self.mean[3] * (one - two * weight[0]));
             let after = [
                 sum[0] + rest * weight[0],
                 sum[1] + slope * weight[1],
@@ -227,7 +291,22 @@ impl<T: Real> Prepared<T> {
             for k in 0..3 {
                 mean[k] = mean[k] * (one - keep) + after[k] * keep;
             }
+            let after_variance = left * tail.most(zero);
+            variance = after_variance + (one - keep * keep) * (variance - after_variance);
             lost = (after_lost + (one - keep * keep) * (lost - after_lost)).most(zero);
+        }
+        if mesa {
+            let across = footprint / self.wavelength;
+            let within = T::of(0.083_333_333) * across * across * (self.lost[0] - lost).most(zero);
+            let [value, slope, spread] = strata(
+                mean[0],
+                self.shape,
+                self.detail,
+                variance.most(zero) + within,
+            );
+            let square = mean[1] * mean[1] + mean[2] * mean[2];
+            lost = lost * (slope * slope + spread) + spread * square;
+            mean = [value, slope * mean[1], slope * mean[2]];
         }
         self.scaled(mean, lost)
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::field::HeightField;
+use super::field::{Domain, HeightField};
 use crate::error::Error;
 
 fn earth() -> f64 {
@@ -17,8 +17,10 @@ pub struct Material {
     pub rock_dark: [f32; 3],
     /// Albedo of the lightest rock.
     pub rock_light: [f32; 3],
-    /// Wavelength of the coarsest rock texture (m), in [1, 1e5].
+    /// Wavelength of the coarsest rock texture (m), in [1, 1e6].
     pub rock_wavelength: f32,
+    /// Albedo of weathered stains as a share of the darkest rock's, in [0, 1].
+    pub rock_stain: f32,
     /// Albedo of snow.
     pub snow: [f32; 3],
     /// Slope (1 - normal.y) up to which snow covers everything; below -1 there is none.
@@ -27,6 +29,8 @@ pub struct Material {
     pub snow_edge_high: f32,
     /// How irregular the border of the snow is, in [0, 1].
     pub snow_noise: f32,
+    /// Height below which no snow lies (m), in [-1e5, 1e5], blurred by 100 m; on a `Sphere` by 300 m, and it falls by 80 m for a degree of latitude.
+    pub snow_line: f32,
 }
 
 impl Default for Material {
@@ -36,10 +40,12 @@ impl Default for Material {
             rock_dark: [0.10, 0.09, 0.08],
             rock_light: [0.34, 0.30, 0.26],
             rock_wavelength: 32.0,
+            rock_stain: 0.6,
             snow: [0.85, 0.87, 0.90],
             snow_edge_low: 0.10,
             snow_edge_high: 0.32,
             snow_noise: 0.15,
+            snow_line: -1e5,
         }
     }
 }
@@ -69,11 +75,23 @@ impl Material {
                 within(name, channel, 0.0, 1.0)?;
             }
         }
-        within("rock_wavelength", self.rock_wavelength, 1.0, 1e5)?;
+        within("rock_wavelength", self.rock_wavelength, 1.0, 1e6)?;
+        within("rock_stain", self.rock_stain, 0.0, 1.0)?;
+        within("snow_line", self.snow_line, -1e5, 1e5)?;
         within("snow_edge_low", self.snow_edge_low, -10.0, 2.0)?;
         within("snow_edge_high", self.snow_edge_high, -10.0, 2.0)?;
         within("snow_noise", self.snow_noise, 0.0, 1.0)
     }
+}
+
+/// A sea on a ball: no ground is below its level.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sea {
+    /// Height of its level (m), in [-2e4, 2e4].
+    pub level: f64,
+    /// Its albedo.
+    pub albedo: [f32; 3],
 }
 
 /// A height field on a planet.
@@ -88,6 +106,9 @@ pub struct Land {
     /// What it is made of.
     #[serde(default)]
     pub material: Material,
+    /// A sea; only where the domain is `Sphere`.
+    #[serde(default)]
+    pub sea: Option<Sea>,
 }
 
 impl Default for Land {
@@ -97,6 +118,7 @@ impl Default for Land {
             field: HeightField::default(),
             planet_radius: earth(),
             material: Material::default(),
+            sea: None,
         }
     }
 }
@@ -110,7 +132,9 @@ macro_rules! shipped {
     };
 }
 
-shipped!("thesis", "alps", "hills", "islands", "lowlands", "moon");
+shipped!(
+    "thesis", "alps", "hills", "islands", "lowlands", "mesa", "moon", "luna", "terra"
+);
 
 impl Land {
     /// Checks every field.
@@ -120,14 +144,36 @@ impl Land {
     pub fn check(&self) -> Result<(), Error> {
         self.field.check()?;
         self.material.check()?;
-        if (1e5..=1e9).contains(&self.planet_radius) {
-            return Ok(());
+        let fault = |name: &str, value: String, domain: &str| {
+            Err(Error::OutOfDomain {
+                name: format!("land.{name}"),
+                value,
+                domain: domain.to_owned(),
+            })
+        };
+        if !(1e5..=1e9).contains(&self.planet_radius) {
+            let value = self.planet_radius.to_string();
+            return fault("planet_radius", value, "in [1e5, 1e9] m");
         }
-        Err(Error::OutOfDomain {
-            name: "land.planet_radius".to_owned(),
-            value: self.planet_radius.to_string(),
-            domain: "in [1e5, 1e9] m".to_owned(),
-        })
+        let on_sphere = self.field.domain == Domain::Sphere;
+        if on_sphere && self.field.wavelength > 0.25 * self.planet_radius {
+            let value = self.field.wavelength.to_string();
+            let domain = "at most a quarter of the planet's radius on a Sphere";
+            return fault("field.wavelength", value, domain);
+        }
+        let Some(sea) = self.sea else {
+            return Ok(());
+        };
+        if !on_sphere {
+            return fault("sea", format!("{sea:?}"), "None on a Plane");
+        }
+        if !(-2e4..=2e4).contains(&sea.level) {
+            return fault("sea.level", sea.level.to_string(), "in [-2e4, 2e4] m");
+        }
+        match sea.albedo.iter().find(|c| !(0.0..=1.0).contains(*c)) {
+            Some(c) => fault("sea.albedo", c.to_string(), "in [0, 1]"),
+            None => Ok(()),
+        }
     }
 
     /// The names that [`Land::named`] knows, the default first.

@@ -4,25 +4,33 @@
 mod calibrate;
 mod clipmap;
 mod field;
+mod globe;
+mod globe_rays;
+mod globe_system;
 mod ground;
 #[cfg(feature = "reference")]
 mod judge;
 mod land;
 mod noise;
+mod noise_3d;
 mod probe;
 mod rays;
 mod real;
+mod surface;
 mod system;
 
 pub use calibrate::{Tail, Tails};
 pub use clipmap::{Clipmap, ClipmapOptions};
 pub use field::{Bounds, Domain, HeightField, Kind};
+pub use globe::{Globe, GlobeGround, GlobePlace};
+pub use globe_rays::globe_heights;
 pub use ground::{Ground, Prepared};
 #[cfg(feature = "reference")]
 pub use judge::{HitErrors, hit_errors};
-pub use land::{Land, Material};
+pub use land::{Land, Material, Sea};
 pub use noise::Place;
 pub use probe::heights;
 pub use rays::{RayPath, TerrainHit, TerrainRay, ray_hits};
 pub use real::Real;
-pub use system::{Terrain, TerrainLights, TerrainOptions};
+pub use surface::Terrain;
+pub use system::{TerrainLights, TerrainOptions};

@@ -117,13 +117,13 @@ pub fn gradient_noise<T: Real>(p: Place<T>, seed: u32) -> [T; 3] {
     ]
 }
 
-fn fade<T: Real>(t: T) -> T {
+pub(super) fn fade<T: Real>(t: T) -> T {
     let s = t - T::of(0.5);
     let w = T::of(0.25) - s * s;
     (s * w * (w * T::of(6.0) + T::of(2.0)) + t).most(T::of(0.0))
 }
 
-fn fade_slope<T: Real>(t: T) -> T {
+pub(super) fn fade_slope<T: Real>(t: T) -> T {
     let s = t - T::of(0.5);
     let q = s * s;
     T::of(1.875) - q * (T::of(15.0) - T::of(30.0) * q)

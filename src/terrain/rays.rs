@@ -16,7 +16,7 @@ use crate::view::WorldPos;
 pub struct TerrainRay {
     /// Where it starts.
     pub origin: WorldPos,
-    /// Its direction, a unit vector, y up at the origin.
+    /// Its direction, a unit vector: y up at the origin over a plane, along the world's axes over a ball.
     pub dir: [f64; 3],
     /// Where it ends at the latest (m).
     pub far: f64,
@@ -27,7 +27,7 @@ pub struct TerrainRay {
 pub struct TerrainHit {
     /// Distance (m); infinite when nothing is met.
     pub distance: f64,
-    /// Upward unit normal in the frame of the ray's origin; 0 when nothing is met.
+    /// Upward unit normal in the frame of the ray's direction; 0 when nothing is met.
     pub normal: [f64; 3],
     /// Height of the field under the hit (m).
     pub height: f64,
@@ -78,7 +78,7 @@ impl TerrainRay {
 }
 
 /// Follows rays on the device. The footprint grows with the distance by `pixel_angle` (rad). Submits and waits; rays with one origin are followed together,
-/// and on the path `Fast` heights are baked around each origin.
+/// and on the path `Fast` heights are baked around each origin. Over a ball each ray starts where it comes below the highest ground, which is found in `f64`.
 ///
 /// # Errors
 /// As [`Land::check`] and [`TerrainRay::check`]; the faults of making pipelines; [`Error::Device`].
@@ -92,6 +92,9 @@ pub fn ray_hits(
 ) -> Result<Vec<TerrainHit>, Error> {
     for (i, ray) in rays.iter().enumerate() {
         ray.check(i)?;
+    }
+    if land.field.on_sphere() {
+        return super::globe_rays::hits(gpu, programs, land, rays, pixel_angle, path);
     }
     let (device, queue) = (&gpu.device, &gpu.queue);
     let farthest = rays.iter().map(|r| r.far.min(1e6)).fold(1000.0, f64::max);

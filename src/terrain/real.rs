@@ -26,6 +26,8 @@ pub trait Real:
     fn whole(self) -> Self;
     /// The vector of gradient noise that a random word stands for; see `veduta::noise::gradient`.
     fn vector(word: u32) -> [Self; 2];
+    /// The two coordinates that the vectors of noise in 3D have.
+    fn sides() -> (Self, Self);
 
     /// The greater of two.
     fn most(self, other: Self) -> Self {
@@ -55,6 +57,9 @@ impl Real for f32 {
     }
     fn whole(self) -> f32 {
         self.floor()
+    }
+    fn sides() -> (f32, f32) {
+        (f32::from_bits(0x3f96_c54d), f32::from_bits(0x3f3a_5ce4))
     }
     // The polynomial and the bit operations of the module, in their order.
     #[allow(clippy::excessive_precision)]
@@ -89,6 +94,11 @@ impl Real for f64 {
     }
     fn whole(self) -> f64 {
         self.floor()
+    }
+    fn sides() -> (f64, f64) {
+        let golden = (1.0 + 5_f64.sqrt()) / 2.0;
+        let short = 1.3847 / (1.0 + golden * golden).sqrt();
+        (golden * short, short)
     }
     fn vector(word: u32) -> [f64; 2] {
         let angle = std::f64::consts::FRAC_PI_4 * f64::from(word >> 9) / f64::from(1_u32 << 23);

@@ -26,6 +26,27 @@ pub struct TerrainLights {
 }
 
 impl TerrainLights {
+    /// Checks every light.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] that names the light, its value and what is allowed.
+    pub fn check(&self) -> Result<(), Error> {
+        for (name, light) in [
+            ("lights.sun", self.sun),
+            ("lights.sky", self.sky),
+            ("lights.bounce", self.bounce),
+        ] {
+            if !(light.is_finite() && light.min_element() >= 0.0) {
+                return Err(Error::OutOfDomain {
+                    name: name.to_owned(),
+                    value: light.to_string(),
+                    domain: "finite and at least 0".to_owned(),
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// Lights of a clear day for a sun of this irradiance, as in the preset `thesis`.
     pub fn clear(sun: Vec3) -> TerrainLights {
         TerrainLights {
@@ -43,8 +64,10 @@ pub struct TerrainOptions {
     pub preset: Preset,
     /// The ground.
     pub land: Land,
-    /// Distance at which rays end (m), in [100, 4e6].
+    /// Distance at which rays end (m), in [100, 4e6]; to 1e9 where the domain is `Sphere`.
     pub far: f64,
+    /// Sectors in which the horizons around a place take light off the sky (ambient occlusion), in [0, 16]; 0 leaves all of it. Nothing comes of it over a ball.
+    pub sky_sectors: u32,
     /// Texels of a level's side, see [`ClipmapOptions::texels`]; 0 leaves it to the preset: 512, or 256 for `low`.
     pub texels: u32,
 }
@@ -56,37 +79,15 @@ impl Default for TerrainOptions {
             preset: Preset::High,
             land: Land::default(),
             far: 60_000.0,
+            sky_sectors: 0,
             texels: 0,
         }
     }
 }
 
-/// Draws a height field over a host's pass, and its depth.
-///
-/// ```no_run
-/// # fn frame(device: &wgpu::Device, queue: &wgpu::Queue, encoder: &mut wgpu::CommandEncoder, target: &wgpu::TextureView, depth: &wgpu::TextureView)
-/// # -> Result<(), veduta::Error> {
-/// use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
-/// let targets = veduta::Targets { depth_format: Some(wgpu::TextureFormat::Depth32Float), ..Default::default() };
-/// let mut terrain = Terrain::new(device, veduta::programs(), &targets, &TerrainOptions::default())?;
-/// let view = veduta::View::default();
-/// // Every frame: heights are baked only where the eye has uncovered ground.
-/// let work = terrain.prepare(queue, encoder, &view, &TerrainLights::clear(view.sun.irradiance), 144)?;
-/// println!("{} levels baked", work.bakes);
-/// let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-///     color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-///         view: target, depth_slice: None, resolve_target: None, ops: wgpu::Operations::default(),
-///     })],
-///     depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-///         view: depth, depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }), stencil_ops: None,
-///     }),
-///     ..Default::default()
-/// });
-/// let _ = terrain.draw_opaque(&mut pass);
-/// # Ok(()) }
-/// ```
+/// Draws a field on the plane over a host's pass, and its depth.
 #[derive(Debug)]
-pub struct Terrain {
+pub(super) struct PlaneTerrain {
     clipmap: Clipmap,
     land: Land,
     far: f64,
@@ -128,17 +129,17 @@ fn azimuths([middle, right, up]: [Vec3; 3]) -> [f64; 2] {
     [middle.z.atan2(middle.x) + first, last - first]
 }
 
-impl Terrain {
+impl PlaneTerrain {
     /// Builds pipelines and makes room for heights.
     ///
     /// # Errors
-    /// [`Error::OutOfDomain`] for targets that it cannot draw into or that have no depth, and for options; the faults of [`Settings::resolve`] and [`Clipmap::new`].
+    /// [`Error::OutOfDomain`] for targets that it cannot draw into or that have no depth, and for options; the faults of [`Settings::resolve`] and the clipmap.
     pub fn new(
         device: &wgpu::Device,
         programs: &ProgramSet,
         targets: &Targets,
         options: &TerrainOptions,
-    ) -> Result<Terrain, Error> {
+    ) -> Result<PlaneTerrain, Error> {
         targets.check()?;
         if targets.projection == Projection::Orthographic {
             return Err(Error::OutOfDomain {
@@ -154,6 +155,13 @@ impl Terrain {
                 domain: "the format of a depth buffer, which the terrain writes".to_owned(),
             });
         };
+        if options.sky_sectors > 16 {
+            return Err(Error::OutOfDomain {
+                name: "terrain.sky_sectors".to_owned(),
+                value: options.sky_sectors.to_string(),
+                domain: "in [0, 16]".to_owned(),
+            });
+        }
         let output = output_of(targets.color_format)?;
         let settings = Settings::resolve(programs, &options.preset, None, &[])?;
         let low = settings.number("TEXTURE_LOW_QUALITY").unwrap_or(0.0) != 0.0;
@@ -179,6 +187,7 @@ impl Terrain {
             ("MAX_MARCHING_STEPS", if low { 250.0 } else { 500.0 }),
             ("REFINE_STEPS", if low { 0.0 } else { 1.0 }),
             ("ROCK_CHEAP", f64::from(u8::from(low))),
+            ("SKY_SECTORS", f64::from(options.sky_sectors)),
         ];
         let ready = programs.get("terrain", &[])?.pipeline(
             device,
@@ -242,7 +251,7 @@ impl Terrain {
                 ],
             ),
         ];
-        Ok(Terrain {
+        Ok(PlaneTerrain {
             clipmap,
             land: options.land.clone(),
             far: options.far,
@@ -297,15 +306,7 @@ impl Terrain {
                 domain: domain.to_owned(),
             })
         };
-        for (name, light) in [
-            ("lights.sun", lights.sun),
-            ("lights.sky", lights.sky),
-            ("lights.bounce", lights.bounce),
-        ] {
-            if !(light.is_finite() && light.min_element() >= 0.0) {
-                return fault(name, light.to_string(), "finite and at least 0");
-            }
-        }
+        lights.check()?;
         if rows == 0 {
             return fault("rows", "0".to_owned(), "at least 1");
         }
@@ -365,6 +366,7 @@ impl Terrain {
             sectors: self.clipmap.sectors[0],
             first_sector: self.clipmap.sectors[1],
             made_sectors: self.clipmap.sectors[2],
+            snow_line: m.snow_line,
             ..Default::default()
         };
         let wavelength = f64::from(m.rock_wavelength);
@@ -377,7 +379,7 @@ impl Terrain {
             hurst: 1.0,
             dark: m.rock_dark,
             light: m.rock_light,
-            stain: m.rock_dark.map(|c| 0.6 * c),
+            stain: m.rock_dark.map(|c| m.rock_stain * c),
             seed: self.land.field.seed.wrapping_add(101),
             ..Default::default()
         };

@@ -42,6 +42,18 @@ fn fields() -> Vec<(&'static str, HeightField)> {
             ),
         ),
         (
+            "mesa",
+            with(
+                Kind::Mesa {
+                    strata: 0.4,
+                    hardness: 0.9,
+                },
+                16384.0,
+                3000.0,
+                0.95,
+            ),
+        ),
+        (
             "mix",
             with(Kind::Mix { mountains: 3.0 }, 4096.0, 1500.0, 1.0),
         ),

@@ -92,7 +92,7 @@ fn rays_over_baked_heights_meet_the_field() {
 }
 
 /// A drawn picture, four numbers a pixel, its depths, and what was recorded.
-fn drawn(
+pub fn drawn(
     terrain: &veduta::terrain::Terrain,
     columns: usize,
     rows: usize,
@@ -327,4 +327,103 @@ fn the_sun_shines_where_the_ground_lets_it() {
     assert!(lit > 60 && dark > 60);
     // Measured: 1.5 %.
     assert!(f64::from(wrong) <= 0.025 * f64::from(judged));
+}
+
+/// Judges `sky_share`.
+#[test]
+fn valleys_see_less_of_the_sky() {
+    use veduta::glam::Vec3;
+    use veduta::reference::terrain::sky_share;
+    use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
+    // A plane that is tilted by 45 degrees sees the share (1 + cos) / 2, over cos; a horizon of 45 degrees all around leaves half.
+    let tilted = sky_share(|[x, _]| x, [0.0; 2], 0.0, [1.0, 0.0], 1.0, 2.0, 4, 720);
+    let cosine = 0.5_f64.sqrt();
+    assert!(
+        (tilted - 0.5 * (1.0 + cosine) / cosine).abs() < 1e-4,
+        "{tilted}"
+    );
+    let pit = sky_share(
+        |[x, z]| x.hypot(z),
+        [0.0; 2],
+        0.0,
+        [0.0; 2],
+        1.0,
+        2.0,
+        4,
+        16,
+    );
+    assert!((pit - 0.5).abs() < 1e-9, "{pit}");
+    let land = Land::named("alps").unwrap();
+    let rows = 36;
+    let columns = rows * 16 / 9;
+    let (rays, angle) = rays(&land, rows, 900.0, -15.0, [13_500.0, -14_700.0]);
+    let gpu = gpu();
+    let targets = veduta::Targets {
+        color_format: wgpu::TextureFormat::Rgba32Float,
+        depth_format: Some(wgpu::TextureFormat::Depth32Float),
+        ..Default::default()
+    };
+    let mut view = veduta::View {
+        eye: rays[0].origin,
+        ..Default::default()
+    };
+    view.look(0.3, f64::to_radians(-15.0), 60_f32.to_radians(), 16.0 / 9.0);
+    let lights = TerrainLights {
+        sun: Vec3::ZERO,
+        sky: Vec3::ONE,
+        bounce: Vec3::ZERO,
+    };
+    let picture = |sky_sectors: u32| {
+        let options = TerrainOptions {
+            land: land.clone(),
+            far: 50_000.0,
+            sky_sectors,
+            ..Default::default()
+        };
+        let mut terrain =
+            Terrain::new(&gpu.device, veduta::programs(), &targets, &options).unwrap();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let _ = terrain
+            .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+            .unwrap();
+        gpu.queue.submit([encoder.finish()]);
+        drawn(&terrain, columns, rows, 0.0)
+    };
+    let ((open, depths, _), (shut, ..)) = (picture(0), picture(8));
+    let field = land.field.prepare::<f64>().unwrap();
+    let forward = view
+        .world_from_view
+        .transform_vector3(Vec3::NEG_Z)
+        .as_dvec3();
+    let (mut off, mut flat, mut mean) = (0.0, 0.0, 0.0);
+    let mut judged = 0.0;
+    for (i, ray) in rays.iter().enumerate() {
+        if depths[i] <= 0.0 || open[4 * i] < 1e-4 || i % 5 != 0 {
+            continue;
+        }
+        let share = f64::from(shut[4 * i] / open[4 * i]);
+        let distance = 0.1 / f64::from(depths[i]) / forward.dot(ray.dir.into());
+        if distance > 15_000.0 {
+            continue;
+        }
+        let eye = field.place(ray.origin);
+        let at = [ray.dir[0] * distance, ray.dir[2] * distance];
+        let footprint = f64::from(angle) * distance;
+        let here = field.ground_from(eye, at, footprint);
+        let height = |p: [f64; 2]| {
+            let away = (p[0] - at[0]).hypot(p[1] - at[1]);
+            field.ground_from(eye, p, footprint.max(0.05 * away)).height
+        };
+        let first = 2.0 * footprint;
+        let truth = sky_share(height, at, here.height, here.slope, first, 1.15, 50, 32);
+        judged += 1.0;
+        off += (share - truth).abs();
+        flat += (1.0 - truth).abs();
+        mean += truth;
+    }
+    let [off, flat, mean] = [off, flat, mean].map(|s| s / judged);
+    println!(
+        "{judged} places: mean share {mean:.3}, mean error {off:.3}, without horizons {flat:.3}"
+    );
+    assert!(judged > 150.0 && off < 0.08 && off < 0.6 * flat);
 }

@@ -35,6 +35,8 @@ struct TerrainView {
     sectors: i32,
     first_sector: i32,
     made_sectors: i32,
+    // Height below which no snow lies [m].
+    snow_line: f32,
 }
 
 @group(0) @binding(0) var<uniform> draw_view: TerrainView;
@@ -97,6 +99,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::terrain::refine::{refined_hit}
 #import veduta::terrain::material::{Rock, faded_noise, rock_low_faded, rock_high_faded, snow_blend}
 #import veduta::terrain::shading::{ThreeLights, shade_rough}
+#import veduta::terrain::sky_share::{sky_share}
 #import veduta::tone_map::exponential::{exponential}
 #import veduta::post::srgb::{encode_srgb, decode_srgb}
 #import veduta::post::dither::{dither}
@@ -120,6 +123,8 @@ override MAX_MARCHING_STEPS: i32 = 200;
 override REFINE_STEPS: i32 = 1;
 // Whether the rock has one fractal instead of four.
 override ROCK_CHEAP: i32 = 0;
+// Sectors in which horizons take light off the sky; 0: none.
+override SKY_SECTORS: i32 = 0;
 
 const INVERSE_PI: f32 = 0.31830988618;
 
@@ -172,9 +177,14 @@ fn draw(in: Corner) -> Shown {
     let lost = ground.lost;
     let level = inverseSqrt(1.0 + dot(slope, slope) + lost);
     let blur = 1.2 * level * level * sqrt(lost * (1.0 - level * level));
-    let snow = snow_blend(level, border, draw_view.snow_edge_low - blur, draw_view.snow_edge_high + blur, draw_view.snow_noise);
+    let high = smoothstep(draw_view.snow_line - 100.0, draw_view.snow_line + 100.0, altitude + 200.0 * border);
+    let snow = high * snow_blend(level, border, draw_view.snow_edge_low - blur, draw_view.snow_edge_high + blur, draw_view.snow_noise);
     albedo = mix(albedo, draw_view.snow_albedo, snow);
-    let lights = ThreeLights(draw_view.sun_light, draw_view.sky_light, draw_view.bounce_light);
+    var open = 1.0;
+    if SKY_SECTORS > 0 {
+        open = sky_share(heights, wrapping, places, clip, point.xz, altitude, slope, footprint, select(0, SKY_SECTORS, is_met));
+    }
+    let lights = ThreeLights(draw_view.sun_light, open * draw_view.sky_light, draw_view.bounce_light);
     let radiance = INVERSE_PI * albedo * shade_rough(lights, slope, lost, draw_view.to_sun, light);
     if !is_met {
         discard;

@@ -7,6 +7,9 @@
 //! over the octaves left. The filtered field mixes H_k and H_(k+1) by the share of the one octave that is fading, so that it keeps its mean, and changes
 //! smoothly with the footprint. The mean square of the slopes that are left out is followed in the same way, for shading.
 //!
+//! The mesa is an fBm whose values pass through strata: T(v) = v + h s sum of w_j sin(2 pi j v / s) / (pi j), with Fejer's weights, so that it never falls: flat benches and cliffs five
+//! times as steep. Its mean over values with a variance follows harmonic by harmonic.
+//!
 //! source   Leitner2022 alg. 1 to 3; Musgrave2003 (hybrid and ridged multifractal); the filter: ours
 //! symbols  offset place from the eye, (x, z) [m] · footprint width of what one sample stands for [m] · kind which field [1]
 #define_import_path veduta::terrain::field
@@ -23,6 +26,7 @@ const FIELD_RIDGED: i32 = 2;
 const FIELD_CRATERS: i32 = 3;
 const FIELD_MIX: i32 = 4;
 const FIELD_OWN: i32 = 5;
+const FIELD_MESA: i32 = 6;
 
 /// A height field and where the eye is on it; the host makes it (`veduta::terrain::HeightField`).
 struct Field {
@@ -38,9 +42,9 @@ struct Field {
     base: f32,
     /// What the amplitude falls by from octave to octave.
     fall: f32,
-    /// Offset of the hybrid, gain of the ridged multifractal, share of cells with a crater, or power of the mountains.
+    /// Offset of the hybrid, gain of the ridged multifractal, share of cells with a crater, power of the mountains, or period of the strata.
     shape: f32,
-    /// Rounding of the crests of the ridged multifractal; height of the noise between craters.
+    /// Rounding of the crests of the ridged multifractal; height of the noise between craters; hardness of the strata.
     detail: f32,
     /// Octaves.
     octaves: i32,
@@ -97,6 +101,41 @@ fn crater_cells(p: Lattice2d, share: f32, seed: u32) -> vec3<f32> {
     return sum;
 }
 
+/// What the strata make of a value of a given variance: the mean, its slope, and what its slope's square varies by.
+///
+/// internal
+fn strata(value: f32, period: f32, hardness: f32, variance: f32) -> vec3<f32> {
+    let turn = value / period;
+    let r = turn - floor(turn + 0.5);
+    let q = r * r;
+    // Sine and cosine of half the angle.
+    let s = r * ((((0.0772201193526 * q - 0.598045169271) * q + 2.55003137647) * q - 5.16770687888) * q + 3.14159258004);
+    let c = ((((-0.0243967164202 * q + 0.234937559128) * q - 1.33521205679) * q + 4.05870916436) * q - 4.93480213723) * q + 0.999999999781;
+    let sine = 2.0 * s * c;
+    let cosine = 1.0 - 2.0 * s * s;
+    // exp(-y) as (1 + y/16)^-16, y = (2 pi / period)^2 variance / 2.
+    let base = 1.0 / (1.0 + 1.23370055 * variance / (period * period));
+    let square = base * base;
+    let fourth = square * square;
+    let eighth = fourth * fourth;
+    let e = eighth * eighth;
+    let e_two = e * e;
+    let e_four = e_two * e_two;
+    let e_eight = e_four * e_four;
+    let e_nine = e_eight * e;
+    let e_sixteen = e_eight * e_eight;
+    let sine_two = 2.0 * cosine * sine;
+    let cosine_two = 2.0 * cosine * cosine - 1.0;
+    let sine_three = 2.0 * cosine * sine_two - sine;
+    let cosine_three = 2.0 * cosine * cosine_two - cosine;
+    let sine_four = 2.0 * cosine * sine_three - sine_two;
+    let cosine_four = 2.0 * cosine * cosine_three - cosine_two;
+    let wave = 0.8 * e * sine + 0.3 * e_four * sine_two + 0.13333333 * e_nine * sine_three + 0.05 * e_sixteen * sine_four;
+    let slope = 0.8 * e * cosine + 0.6 * e_four * cosine_two + 0.4 * e_nine * cosine_three + 0.2 * e_sixteen * cosine_four;
+    let spread = 0.64 * (1.0 - e * e) + 0.36 * (1.0 - e_four * e_four) + 0.16 * (1.0 - e_nine * e_nine) + 0.04 * (1.0 - e_sixteen * e_sixteen);
+    return vec3<f32>(value + 0.31830988618 * hardness * period * wave, 1.0 + 2.0 * hardness * slope, 2.0 * hardness * hardness * spread);
+}
+
 /// The sum over octaves for all kinds but the mix.
 ///
 /// internal
@@ -111,7 +150,9 @@ fn octave_sum(field: Field, kind: i32, start: Lattice2d, footprint: f32) -> Grou
     var tail_step = field.mean.y;
     var rough = field.lost.x;
     var rough_step = field.lost.y;
-    var mean = vec3<f32>(tail, 0.0, 0.0);
+    // The mesa follows the variance of what is left in the place of its mean, which is 0.
+    var mean = vec3<f32>(select(tail, 0.0, kind == FIELD_MESA), 0.0, 0.0);
+    var variance = tail;
     var lost = rough;
     for (var i = 0; i < field.octaves; i++) {
         if reach <= 1.0 {
@@ -160,14 +201,24 @@ fn octave_sum(field: Field, kind: i32, start: Lattice2d, footprint: f32) -> Grou
         reach *= 0.5;
         // Nothing follows the last octave: rounding must not leave any of it.
         let left = select(1.0, 0.0, i + 1 == field.octaves);
-        let rest = left * tail * (1.0 + field.mean.w * (1.0 - weight.x));
-        let slope = left * tail * (1.0 + field.mean.w * (1.0 - 2.0 * weight.x));
+        let means = select(left * tail, 0.0, kind == FIELD_MESA);
+        let rest = means * (1.0 + field.mean.w * (1.0 - weight.x));
+        let slope = means * (1.0 + field.mean.w * (1.0 - 2.0 * weight.x));
         let after = sum + vec3<f32>(rest * weight.x, slope * weight.yz);
         let after_lost = left * max(rough, 0.0) * weight.x * (1.0 + field.lost.w * (1.0 - weight.x));
         mean = mean * (1.0 - keep) + after * keep;
+        let after_variance = left * max(tail, 0.0);
+        variance = after_variance + (1.0 - keep * keep) * (variance - after_variance);
         lost = max(after_lost + (1.0 - keep * keep) * (lost - after_lost), 0.0);
     }
     let steepness = field.amplitude / field.wavelength;
+    if kind == FIELD_MESA {
+        // What the footprint holds of the slopes that are left makes values vary, too.
+        let across = footprint / field.wavelength;
+        let beds = strata(mean.x, field.shape, field.detail, max(variance, 0.0) + 0.083333333 * across * across * max(field.lost.x - lost, 0.0));
+        lost = lost * (beds.y * beds.y + beds.z) + beds.z * dot(mean.yz, mean.yz);
+        mean = vec3<f32>(beds.x, beds.y * mean.yz);
+    }
     return Ground(field.base + field.amplitude * mean.x, steepness * mean.yz, steepness * steepness * lost);
 }
 

@@ -111,6 +111,7 @@ impl Drawer {
             land: Land::named("thesis")?,
             far: 100_000.0,
             texels,
+            ..Default::default()
         };
         let depth = device
             .create_texture(&wgpu::TextureDescriptor {

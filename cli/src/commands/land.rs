@@ -1,9 +1,10 @@
 //! `veduta land`: a picture of a land under its sky.
 
+use std::f64::consts::FRAC_PI_2;
 use std::path::PathBuf;
 
 use veduta::atmosphere::{LightPlace, Sky, SkyComposition, SkyOptions, SkyQuery};
-use veduta::glam::{DVec3, Vec3};
+use veduta::glam::{DQuat, DVec3, Mat4, Vec3};
 use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
 use veduta::view::direction;
 use veduta::wgpu;
@@ -29,10 +30,16 @@ pub struct LandArgs {
     /// The preset
     #[arg(long, value_name = "NAME", default_value = "high")]
     pub preset: String,
-    /// Place of the eye, x and z in metres
-    #[arg(long, value_name = "X,Z", value_delimiter = ',', num_args = 2, default_values_t = [13500.0, -14700.0], allow_negative_numbers = true)]
-    pub place: Vec<f64>,
-    /// Height of the eye above the ground in metres, 0.1 to 1e7
+    /// Place of the eye, x and z in metres, 13500,-14700 when left out; over a ball latitude and longitude in degrees, 20,0 when left out
+    #[arg(
+        long,
+        value_name = "X,Z",
+        value_delimiter = ',',
+        num_args = 2,
+        allow_negative_numbers = true
+    )]
+    pub place: Option<Vec<f64>>,
+    /// Height of the eye above the ground in metres, 0.1 to 1e7; over a ball up to 1e8
     #[arg(long, default_value_t = 300.0)]
     pub eye_height: f64,
     /// Direction of the view in degrees, clockwise from -z
@@ -50,9 +57,12 @@ pub struct LandArgs {
     /// Azimuth of the sun in degrees, clockwise from -z
     #[arg(long, default_value_t = 120.0, allow_negative_numbers = true)]
     pub sun_azimuth: f64,
-    /// Distance at which rays end in metres, 100 to 4e6
-    #[arg(long, default_value_t = 100_000.0)]
-    pub far: f64,
+    /// Distance at which rays end in metres, 100 to 4e6, 1e5 when left out; over a ball up to 1e9, and not before when left out
+    #[arg(long)]
+    pub far: Option<f64>,
+    /// Sectors in which the horizons around a place take light off the sky, 0 to 16
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=16))]
+    pub sky_sectors: u32,
     /// Width and height of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "256x144")]
     pub size: Size,
@@ -88,22 +98,39 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
             format!("in [{low}, {high}]"),
         ))
     };
-    within("--eye-height", args.eye_height, 0.1, 1e7)?;
     within("--fov", args.fov, 0.01, 170.0)?;
     within("--pitch", args.pitch, -90.0, 90.0)?;
     within("--yaw", args.yaw, -360.0, 360.0)?;
     within("--sun-height", args.sun_height, -90.0, 90.0)?;
     within("--sun-azimuth", args.sun_azimuth, -360.0, 360.0)?;
-    within("--far", args.far, 100.0, 4e6)?;
-    for place in &args.place {
-        within("--place", *place, -9e15, 9e15)?;
-    }
     if let Some(exposure) = args.exposure {
         within("--exposure", exposure, 0.0, 1e12)?;
     }
     let gpu = veduta::device::shared()?;
     let (device, queue) = (&gpu.device, &gpu.queue);
     let land = land(&args.land)?;
+    let ball = if land.field.on_sphere() {
+        Some(land.globe::<f64>()?)
+    } else {
+        None
+    };
+    let most = if ball.is_some() { 1e8 } else { 1e7 };
+    within("--eye-height", args.eye_height, 0.1, most)?;
+    let far = args.far.unwrap_or(if ball.is_some() { 1e9 } else { 1e5 });
+    within("--far", far, 100.0, if ball.is_some() { 1e9 } else { 4e6 })?;
+    let place = match (&args.place, &ball) {
+        (Some(place), _) => [place[0], place[1]],
+        (None, Some(_)) => [20.0, 0.0],
+        (None, None) => [13_500.0, -14_700.0],
+    };
+    if ball.is_some() {
+        within("--place", place[0], -90.0, 90.0)?;
+        within("--place", place[1], -360.0, 360.0)?;
+    } else {
+        for coordinate in place {
+            within("--place", coordinate, -9e15, 9e15)?;
+        }
+    }
     let airless = args.atmosphere == "none";
     let mut air = atmosphere(if airless { "earth" } else { &args.atmosphere })?;
     air.planet_radius = land.planet_radius;
@@ -114,13 +141,28 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
         depth_format: Some(wgpu::TextureFormat::Depth32Float),
         ..Default::default()
     };
-    let foot = WorldPos::from_metres(DVec3::new(args.place[0], 0.0, args.place[1]));
-    let ground = land.field.prepare::<f64>()?.ground(foot, 0.0).height;
+    let (eye, ground) = if let Some(ball) = &ball {
+        let place = place.map(f64::to_radians);
+        let ground = ball.ground(ball.above(place, 0.0), 0.0).height;
+        (ball.above(place, ground + args.eye_height), ground)
+    } else {
+        let foot = WorldPos::from_metres(DVec3::new(place[0], 0.0, place[1]));
+        let ground = land.field.prepare::<f64>()?.ground(foot, 0.0).height;
+        let up = DVec3::new(0.0, ground + args.eye_height, 0.0);
+        (foot.moved_by(up), ground)
+    };
+    // From the frame with x to the east, y up and z to the south: over a ball it is turned.
+    let turn = if ball.is_some() {
+        let [latitude, longitude] = place.map(f64::to_radians);
+        DQuat::from_rotation_y(longitude) * DQuat::from_rotation_x(FRAC_PI_2 - latitude)
+    } else {
+        DQuat::IDENTITY
+    };
     let to_sun = direction(args.sun_height.to_radians(), args.sun_azimuth.to_radians());
     let mut view = View {
-        eye: foot.moved_by(DVec3::new(0.0, ground + args.eye_height, 0.0)),
+        eye,
         sun: Light {
-            to_light: to_sun.as_vec3(),
+            to_light: (turn * to_sun).as_vec3(),
             irradiance: Vec3::ONE,
             angular_radius: air.sun.angular_radius as f32,
         },
@@ -133,10 +175,13 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
         args.fov.to_radians() as f32,
         width as f32 / height as f32,
     );
+    view.world_from_view = Mat4::from_quat(turn.as_quat()) * view.world_from_view;
+    let radius = land.planet_radius;
     let options = TerrainOptions {
         preset: preset.clone(),
         land,
-        far: args.far,
+        far,
+        sky_sectors: args.sky_sectors,
         ..Default::default()
     };
     let mut terrain = Terrain::new(device, veduta::programs(), &targets, &options)?;
@@ -155,7 +200,7 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
         Some(Sky::new(device, veduta::programs(), &over, &options)?)
     };
     let mut lights = TerrainLights {
-        sun: if to_sun.y > 0.0 {
+        sun: if to_sun.y > 0.0 || ball.is_some() {
             Vec3::ONE
         } else {
             Vec3::ZERO
@@ -166,17 +211,39 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
     if let Some(sky) = &mut sky {
         let atmosphere = sky.tables().atmosphere().clone();
         let query = SkyQuery::new(device, veduta::programs(), &atmosphere)?;
-        let place = LightPlace {
-            altitude: ground.clamp(0.0, atmosphere.thickness),
-            to_sun: to_sun.to_array(),
-            normal: [0.0, 1.0, 0.0],
-            sun_angular_radius: f64::from(view.sun.angular_radius),
-        };
-        let found = query.run(device, queue, sky.tables_mut(), &[place])?[0];
-        lights.sun = Vec3::from_array(found.sun);
-        lights.sky = Vec3::from_array(found.sky);
-        // What ground of an albedo of a fifth throws back onto a slope that faces it by half.
-        lights.bounce = 0.1 * (lights.sun * (to_sun.y.max(0.0) as f32) + lights.sky);
+        let mut places = vec![to_sun];
+        if ball.is_some() {
+            places = Terrain::sun_cosines()
+                .iter()
+                .map(|mu| DVec3::new((1.0 - mu * mu).max(0.0).sqrt(), *mu, 0.0))
+                .collect();
+        }
+        let level = if ball.is_some() { 0.0 } else { ground };
+        let rows: Vec<LightPlace> = places
+            .iter()
+            .map(|to_sun| LightPlace {
+                altitude: level.clamp(0.0, atmosphere.thickness),
+                to_sun: to_sun.to_array(),
+                normal: [0.0, 1.0, 0.0],
+                sun_angular_radius: f64::from(view.sun.angular_radius),
+            })
+            .collect();
+        let found = query.run(device, queue, sky.tables_mut(), &rows)?;
+        let all: Vec<TerrainLights> = found
+            .iter()
+            .zip(&places)
+            .map(|(found, to_sun)| {
+                let (sun, sky) = (Vec3::from_array(found.sun), Vec3::from_array(found.sky));
+                // What ground of an albedo of a fifth throws back onto a slope that faces it by half.
+                let bounce = 0.1 * (sun * (to_sun.y.max(0.0) as f32) + sky);
+                TerrainLights { sun, sky, bounce }
+            })
+            .collect();
+        if ball.is_some() {
+            terrain.set_lights_by_sun(Some(&all))?;
+        } else {
+            lights = all[0];
+        }
     }
     let texture = |format, usage| {
         device.create_texture(&wgpu::TextureDescriptor {
@@ -250,9 +317,8 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
         finish(encoder)?;
         draws.push(since(before));
         if frame + 1 < args.frames {
-            view.eye = view
-                .eye
-                .moved_by(direction(0.0, args.yaw.to_radians()) * (100.0 / 30.0));
+            let ahead = turn * direction(0.0, args.yaw.to_radians());
+            view.eye = view.eye.moved_by(ahead * (100.0 / 30.0));
         }
     }
     if let Some((first, others)) = bakes.split_first() {
@@ -269,7 +335,11 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
     draw(&mut encoder, &terrain);
     if let Some(sky) = &mut sky {
         sky.set_host(device, &depth_view, Some(&picture_view))?;
-        let _ = sky.prepare(queue, &mut encoder, &view)?;
+        let level = match ball {
+            Some(_) => view.levelled(radius),
+            None => view,
+        };
+        let _ = sky.prepare(queue, &mut encoder, &level)?;
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: &shown_view,

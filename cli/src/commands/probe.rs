@@ -49,7 +49,7 @@ pub struct TerrainArgs {
     /// A shipped land or a .ron file
     #[arg(long, value_name = "NAME|FILE", default_value = "thesis")]
     pub scene: String,
-    /// The rays, .npy or .csv: origin, unit direction, largest distance
+    /// The rays, .npy or .csv: origin, unit direction, largest distance; over a ball along the world's axes, its centre being (0, -radius, 0)
     #[arg(long, value_name = "ROWS")]
     pub rays: PathBuf,
     /// How rays are followed
@@ -80,7 +80,7 @@ pub struct HeightArgs {
     /// A shipped land or a .ron file
     #[arg(long, value_name = "NAME|FILE", default_value = "thesis")]
     pub scene: String,
-    /// The places, .npy or .csv: x and z in metres
+    /// The places, .npy or .csv: x and z in metres; over a ball latitude and longitude in degrees
     #[arg(long, value_name = "XZ")]
     pub points: PathBuf,
     /// Where the heights are computed
@@ -201,9 +201,19 @@ fn terrain(args: &TerrainArgs) -> Result<(), CliError> {
     let mut rays = Vec::with_capacity(numbers.len() / 7);
     for (row, [x, y, z, dx, dy, dz, far]) in numbers.as_chunks::<7>().0.iter().enumerate() {
         let near = x.abs() <= 9e15 && z.abs() <= 9e15 && y.abs() <= 1e5;
-        if !near {
+        let in_orbit = [x, y, z].iter().all(|c| c.abs() <= 1e9);
+        if !(if land.field.on_sphere() {
+            in_orbit
+        } else {
+            near
+        }) {
+            let domain = if land.field.on_sphere() {
+                "within 1e9 m of the place at the altitude 0 on the y axis"
+            } else {
+                "within 9e15 m, and its altitude within 1e5 m"
+            };
             return Err(fault(format!(
-                "the origin of row {row} is ({x}, {y}, {z}), but must be within 9e15 m, and its altitude within 1e5 m"
+                "the origin of row {row} is ({x}, {y}, {z}), but must be {domain}"
             )));
         }
         let length = (dx * dx + dy * dy + dz * dz).sqrt();
@@ -221,6 +231,13 @@ fn terrain(args: &TerrainArgs) -> Result<(), CliError> {
         rays.push(ray);
     }
     let hits = match args.path {
+        Follow::Reference if land.field.on_sphere() => {
+            let globe = land.globe::<f64>()?;
+            let angle = f64::from(args.pixel_angle);
+            rays.iter()
+                .map(|r| globe.ray_hit(r, angle, 0.05))
+                .collect::<Result<Vec<_>, _>>()?
+        }
         Follow::Reference => {
             let field = land.field.prepare::<f64>()?;
             let top = land.field.bounds()?.maximum;
@@ -271,6 +288,9 @@ fn height(args: &HeightArgs) -> Result<(), CliError> {
             "finite and at least 0 m",
         ));
     }
+    if land.field.on_sphere() {
+        return ball_height(args, &land);
+    }
     let numbers = Table::read(&args.points, 2)?.to_numbers(&args.points)?;
     let mut places = Vec::with_capacity(numbers.len() / 2);
     for (row, [x, z]) in numbers.as_chunks::<2>().0.iter().enumerate() {
@@ -310,6 +330,49 @@ fn height(args: &HeightArgs) -> Result<(), CliError> {
             places
                 .iter()
                 .map(|p| (field.ground(*p, footprint).height as f32).to_bits())
+                .collect()
+        }
+    };
+    write_results(&args.out, &heights, 1, ResultKind::F32)
+}
+
+/// Heights of a ball: rows are latitude and longitude in degrees.
+fn ball_height(args: &HeightArgs, land: &Land) -> Result<(), CliError> {
+    let globe = land.globe::<f64>()?;
+    let numbers = Table::read(&args.points, 2)?.to_numbers(&args.points)?;
+    let mut places = Vec::with_capacity(numbers.len() / 2);
+    for (row, [latitude, longitude]) in numbers.as_chunks::<2>().0.iter().enumerate() {
+        if !(latitude.abs() <= 90.0 && longitude.abs() <= 360.0) {
+            return Err(CliError::Table {
+                path: args.points.clone(),
+                what: format!(
+                    "row {row} is ({latitude}, {longitude}), but must be a latitude in [-90, 90] and a longitude in [-360, 360] degrees"
+                ),
+            });
+        }
+        places.push(globe.above([latitude.to_radians(), longitude.to_radians()], 0.0));
+    }
+    let heights: Vec<u32> = match args.on {
+        On::Device => {
+            let gpu = veduta::device::shared()?;
+            let programs = veduta::programs();
+            veduta::terrain::globe_heights(gpu, programs, land, &places, args.footprint)?
+                .iter()
+                .map(|g| g.height.to_bits())
+                .collect()
+        }
+        On::Cpu => {
+            let globe = land.globe::<f32>()?;
+            places
+                .iter()
+                .map(|p| globe.ground(*p, args.footprint).height.to_bits())
+                .collect()
+        }
+        On::Reference => {
+            let footprint = f64::from(args.footprint);
+            places
+                .iter()
+                .map(|p| (globe.ground(*p, footprint).height as f32).to_bits())
                 .collect()
         }
     };

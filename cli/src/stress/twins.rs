@@ -8,6 +8,7 @@ use veduta::reference::atmosphere::{Atmosphere, SkyLight};
 use veduta::reference::clouds::{CloudLayer, CloudLight};
 use veduta::reference::field::{self, Field, Ground};
 use veduta::reference::fractal::warp;
+use veduta::reference::globe::{self, Globe, GlobeGround};
 use veduta::reference::noise::{Lattice2d, Lattice3d, simplex, worley};
 use veduta::reference::phase::DropletPhase;
 use veduta::reference::planet::{ShellSegment, Span};
@@ -52,6 +53,10 @@ impl Values {
 
 /// Functions that read textures, each with the test of `tests/all` that judges it on the device.
 pub const ELSEWHERE: &[(&str, &str)] = &[
+    (
+        "veduta::terrain::sky_share::sky_share",
+        "valleys_see_less_of_the_sky",
+    ),
     (
         "veduta::terrain::clipmap::baked_height",
         "rays_over_baked_heights_meet_the_field",
@@ -220,6 +225,30 @@ argument!(Field {
     seed: u32,
     mean: [f64; 4],
     lost: [f64; 4]
+});
+argument!(Globe {
+    cell: [i32; 3],
+    wavelength: f64,
+    frac: [f64; 3],
+    amplitude: f64,
+    up: [f64; 3],
+    base: f64,
+    ground_radius: f64,
+    eye_altitude: f64,
+    fall: f64,
+    shape: f64,
+    detail: f64,
+    octaves: i32,
+    seed: u32,
+    sea: f64,
+    mean: [f64; 4],
+    lost: [f64; 4],
+    low: f64,
+    high: f64,
+    steepest: f64,
+    tallest: f64,
+    steep: f64,
+    steep_growth: f64
 });
 argument!(Rock {
     cell: [i32; 3],
@@ -527,6 +556,13 @@ impl Answer for Ground {
     }
 }
 
+impl Answer for GlobeGround {
+    fn values(self) -> Values {
+        let [x, y, z] = self.slope;
+        Values::new(&[self.height, x, y, z, self.lost])
+    }
+}
+
 impl Answer for field::Refined {
     fn values(self) -> Values {
         let ([x, y, z], [a, b]) = (self.normal, self.ground.slope);
@@ -793,6 +829,32 @@ impl Entry {
             .lin("field.octaves", 1.0, 12.0)
             .lin("field.mean", 0.1, 0.5)
             .lin("field.lost", 0.1, 0.5)
+    }
+
+    /// The domains of a height field on a ball that the promises of errors are for.
+    fn globe(self) -> Entry {
+        self.lin("globe.cell", -2_147_483_648.0, 2_147_483_647.0)
+            .lin("globe.frac", 0.0, 1.0)
+            .log("globe.wavelength", 32_768.0, 262_144.0)
+            .lin("globe.amplitude", 1.0, 1400.0)
+            .lin("globe.base", -1000.0, 1000.0)
+            .lin("globe.up", -1.0, 1.0)
+            .unit("globe.up")
+            .log("globe.ground_radius", 1.7e6, 7e6)
+            .lin("globe.eye_altitude", 0.0, 2e5)
+            .lin("globe.fall", 0.3, 0.5)
+            .lin("globe.shape", 0.0, 1.0)
+            .lin("globe.detail", 0.0, 1.0)
+            .lin("globe.octaves", 1.0, 8.0)
+            .lin("globe.sea", -1e5, -1e4)
+            .lin("globe.mean", 0.1, 0.5)
+            .lin("globe.lost", 0.1, 0.5)
+            .lin("globe.low", -1e4, -1e3)
+            .lin("globe.high", 1e3, 1e4)
+            .lin("globe.steepest", 0.0, 10.0)
+            .lin("globe.tallest", 0.0, 2.0)
+            .lin("globe.steep", 0.0, 10.0)
+            .lin("globe.steep_growth", 0.5, 2.0)
     }
 
     fn rock(self) -> Entry {
@@ -1561,6 +1623,22 @@ pub fn registry() -> Vec<Entry> {
     );
     other!(
         list,
+        "terrain::globe::globe_ground",
+        "globe::ground",
+        |ball: Globe, kind: i32, cell: [i32; 3], frac: [f64; 3], up: [f64; 3], footprint: f64| {
+            globe::ground(&ball, kind, cell, frac, up, footprint)
+        }
+    );
+    other!(
+        list,
+        "terrain::globe::globe_at",
+        "globe::ground_from",
+        |ball: Globe, kind: i32, at: [f64; 3], footprint: f64| {
+            globe::ground_from(&ball, kind, at, footprint)
+        }
+    );
+    other!(
+        list,
         "terrain::refine::refined_hit",
         "field::refined",
         |field: Field,
@@ -2065,6 +2143,10 @@ fn particular(entry: Entry) -> Entry {
             .lin("front.transmittance", 0.0, 1.0),
         ("terrain::height", _) => entry.terrain().weight(20.0),
         ("terrain::field", _) => entry.field().judged(&["height"]).weight(60.0),
+        ("terrain::globe", "globe_ground") => {
+            entry.globe().unit("up").judged(&["height"]).weight(100.0)
+        }
+        ("terrain::globe", _) => entry.globe().judged(&["height"]).weight(100.0),
         ("terrain::refine", _) => entry
             .field()
             .unit("dir")

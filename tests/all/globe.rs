@@ -1,0 +1,470 @@
+//! Height fields on a ball: the device, the processor and the definition; rays from orbit; depth and normals.
+
+use veduta::WorldPos;
+use veduta::reference::globe as reference;
+use veduta::reference::parallel::parallel_map;
+use veduta::terrain::{
+    Domain, Globe, HeightField, Kind, Land, RayPath, TerrainHit, TerrainRay, globe_heights,
+    ray_hits,
+};
+
+use crate::common::{Random, gpu};
+
+fn unit(random: &mut Random) -> [f64; 2] {
+    let height = 2.0 * f64::from(random.unit()) - 1.0;
+    [
+        height.asin(),
+        std::f64::consts::TAU * f64::from(random.unit()),
+    ]
+}
+
+/// One of each kind, with a relief of about 8 km.
+fn lands() -> Vec<(&'static str, Land)> {
+    let with = |kind, wavelength, amplitude, hurst| Land {
+        field: HeightField {
+            kind,
+            domain: Domain::Sphere,
+            wavelength,
+            amplitude,
+            hurst,
+            octaves: 12,
+            ..HeightField::default()
+        },
+        ..Land::default()
+    };
+    let craters = Kind::Craters {
+        share: 0.5,
+        roughness: 0.1,
+    };
+    let ridged = Kind::Ridged {
+        gain: 2.0,
+        smoothness: 0.01,
+    };
+    vec![
+        ("fbm", with(Kind::Fbm, 100_000.0, 3000.0, 1.0)),
+        ("ridged", with(ridged, 60_000.0, 4000.0, 0.9)),
+        (
+            "hybrid",
+            with(Kind::Hybrid { offset: 0.7 }, 100_000.0, 2500.0, 0.25),
+        ),
+        ("craters", with(craters, 200_000.0, 9000.0, 1.0)),
+    ]
+}
+
+fn block(globe: &Globe<f32>, eye: WorldPos) -> reference::Globe {
+    let b = globe.block(eye, 0.0);
+    let wide = |v: [f32; 3]| v.map(f64::from);
+    reference::Globe {
+        cell: b.cell,
+        wavelength: f64::from(b.wavelength),
+        frac: wide(b.frac),
+        amplitude: f64::from(b.amplitude),
+        up: wide(b.up),
+        base: f64::from(b.base),
+        ground_radius: f64::from(b.ground_radius),
+        eye_altitude: f64::from(b.eye_altitude),
+        fall: f64::from(b.fall),
+        shape: f64::from(b.shape),
+        detail: f64::from(b.detail),
+        octaves: b.octaves,
+        seed: b.seed,
+        sea: f64::from(b.sea),
+        mean: b.mean.map(f64::from),
+        lost: b.lost.map(f64::from),
+        low: f64::from(b.low),
+        high: f64::from(b.high),
+        steepest: f64::from(b.steepest),
+        tallest: f64::from(b.tallest),
+        steep: f64::from(b.steep),
+        steep_growth: f64::from(b.steep_growth),
+    }
+}
+
+#[test]
+fn a_ball_is_the_same_on_the_device_the_processor_and_by_definition() {
+    let mut random = Random(1);
+    for (name, land) in lands() {
+        let (single, double) = (land.globe::<f32>().unwrap(), land.globe::<f64>().unwrap());
+        let (mut same, mut total) = (0, 0);
+        let (mut worst, mut off, mut definition, mut tilt) = (0_f64, 0_f64, 0_f64, 0_f64);
+        for width in [0.0, 100.0, 3000.0, 30_000.0] {
+            let places: Vec<WorldPos> = (0..3000)
+                .map(|_| double.above(unit(&mut random), 0.0))
+                .collect();
+            let found = globe_heights(gpu(), veduta::programs(), &land, &places, width).unwrap();
+            for (i, (p, g)) in places.iter().zip(found).enumerate() {
+                let twin = single.ground(*p, width);
+                let truth = double.ground(*p, f64::from(width));
+                total += 1;
+                same += i32::from(twin == g);
+                let apart = f64::from((g.height - twin.height).abs());
+                let size = f64::from(g.height).abs().max(land.field.amplitude);
+                worst = worst.max(apart / (0.5 * f64::from(f32::EPSILON) * size));
+                off = off.max((f64::from(g.height) - truth.height).abs());
+                assert!(g.lost >= 0.0 && g.lost.is_finite());
+                if i % 20 == 0 {
+                    let place = double.place(*p);
+                    let ball = block(&single, *p);
+                    let kind = land.field.kind.number();
+                    let width = f64::from(width);
+                    let defined =
+                        reference::ground(&ball, kind, place.cell, place.frac, place.up, width);
+                    definition = definition.max((defined.height - truth.height).abs());
+                    for k in 0..3 {
+                        tilt = tilt.max((defined.slope[k] - truth.slope[k]).abs());
+                    }
+                }
+            }
+        }
+        println!(
+            "{name}: {same} of {total} bit by bit, {worst:.1} places, {:.1} mm; the definition {:.1} mm, slopes {tilt:.1e}",
+            1e3 * off,
+            1e3 * definition
+        );
+        assert!(
+            worst <= if name == "hybrid" { 12.0 } else { 4.0 },
+            "{name}: {worst}"
+        );
+        assert!(off <= 0.030, "{name}: {off} m");
+        // The series have f32 members in the reference's field.
+        assert!(definition <= 0.03 && tilt <= 1e-2, "{name}");
+    }
+}
+
+#[test]
+fn slopes_on_a_ball_are_along_it_and_those_of_its_heights() {
+    let mut random = Random(3);
+    for (name, land) in lands() {
+        let globe = land.globe::<f64>().unwrap();
+        let (mut bad, total) = (0, 1500);
+        for i in 0..total {
+            let [latitude, longitude] = unit(&mut random);
+            let width = if i % 2 == 0 { 0.0 } else { 2000.0 };
+            let step = 2e-8;
+            let at = |a: f64, b: f64| {
+                let p = globe.above([latitude + a, longitude + b / latitude.cos()], 0.0);
+                (globe.place(p), globe.ground(p, width))
+            };
+            let (place, g) = at(0.0, 0.0);
+            let outward: f64 = (0..3).map(|k| g.slope[k] * place.up[k]).sum();
+            assert!(outward.abs() < 1e-9, "{name}: {outward}");
+            let north = (at(step, 0.0).0.up, at(-step, 0.0).0.up);
+            let east = (at(0.0, step).0.up, at(0.0, -step).0.up);
+            let rise = |[a, b]: [f64; 2]| at(a, b).1.height - at(-a, -b).1.height;
+            let along = |(p, q): ([f64; 3], [f64; 3])| {
+                let way: [f64; 3] = std::array::from_fn(|k| (p[k] - q[k]) * globe.radius());
+                (0..3).map(|k| way[k] * g.slope[k]).sum::<f64>()
+            };
+            let length = 2.0 * step * globe.radius();
+            let off = ((rise([step, 0.0]) - along(north)) / length)
+                .abs()
+                .max(((rise([0.0, step]) - along(east)) / length).abs());
+            let size = 1.0 + g.slope.iter().map(|s| s * s).sum::<f64>().sqrt();
+            bad += i32::from(off > 3e-3 * size);
+        }
+        println!("{name}: {bad} of {total} at a kink");
+        assert!(bad <= total / 100, "{name}: {bad}");
+    }
+}
+
+#[test]
+fn bounds_and_lost_slopes_hold_on_a_ball() {
+    let mut random = Random(4);
+    for (name, land) in lands() {
+        let globe = land.globe::<f64>().unwrap();
+        let bounds = globe.bounds();
+        let (mut low, mut high, mut steep) = (f64::INFINITY, f64::NEG_INFINITY, 0_f64);
+        for share in [0.3, 0.05, 0.01] {
+            let width = share * land.field.wavelength;
+            let (mut all, mut kept, mut lost) = (0.0, 0.0, 0.0);
+            for _ in 0..4000 {
+                let p = globe.above(unit(&mut random), 0.0);
+                let square = |s: [f64; 3]| s.iter().map(|s| s * s).sum::<f64>();
+                let whole = globe.ground(p, 0.0);
+                let g = globe.ground(p, width);
+                for g in [&whole, &g] {
+                    low = low.min(g.height);
+                    high = high.max(g.height);
+                    steep = steep.max(square(g.slope).sqrt());
+                }
+                all += square(whole.slope);
+                kept += square(g.slope);
+                lost += g.lost;
+            }
+            println!(
+                "{name}, footprint {width:.0} m: slopes {:.4}, kept {:.4}, lost {:.4}",
+                all / 4000.0,
+                kept / 4000.0,
+                lost / 4000.0
+            );
+            let bar = if name == "hybrid" { 0.35 } else { 0.15 };
+            assert!(((kept + lost) / all - 1.0).abs() < bar, "{name}");
+        }
+        println!(
+            "{name}: heights {low:.0} .. {high:.0} of {:.0} .. {:.0}, slope {steep:.2} of {:.2}",
+            bounds.minimum, bounds.maximum, bounds.lipschitz
+        );
+        assert!(low >= bounds.minimum && high <= bounds.maximum, "{name}");
+        assert!(steep <= bounds.lipschitz, "{name}");
+    }
+}
+
+/// Rays of a picture of so many rows, 16:9, from a height above a place, looking down from level by an angle.
+fn rays(
+    globe: &Globe<f64>,
+    rows: usize,
+    height: f64,
+    pitch: f64,
+    field_of_view: f64,
+) -> (Vec<TerrainRay>, f32, veduta::View) {
+    use veduta::glam::{DQuat, Mat4};
+    let (latitude, longitude) = (0.35, 0.6);
+    let turn = DQuat::from_rotation_y(longitude)
+        * DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2 - latitude);
+    let mut view = veduta::View {
+        eye: globe.above([latitude, longitude], height),
+        ..Default::default()
+    };
+    let angle = field_of_view.to_radians() as f32;
+    view.look(0.3, pitch.to_radians(), angle, 16.0 / 9.0);
+    view.world_from_view = Mat4::from_quat(turn.as_quat()) * view.world_from_view;
+    let [middle, right, up] = view.rays().unwrap().map(|v| v.as_dvec3());
+    let columns = rows * 16 / 9;
+    let mut rays = Vec::new();
+    for y in 0..rows {
+        for x in 0..columns {
+            let at = |i: usize, n: usize| 2.0 * (i as f64 + 0.5) / n as f64 - 1.0;
+            let dir = (middle + right * at(x, columns) - up * at(y, rows)).normalize();
+            rays.push(TerrainRay {
+                origin: view.eye,
+                dir: dir.to_array(),
+                far: 1e9,
+            });
+        }
+    }
+    (rays, (2.0 * up.length() / rows as f64) as f32, view)
+}
+
+/// How far a hit lies off the field across the ray (m), given the true one.
+fn across(globe: &Globe<f64>, ray: &TerrainRay, angle: f64, found: f64, truth: f64) -> f64 {
+    let gap = |at: f64| {
+        let p = ray.origin.moved_by(ray.dir.map(|c| c * at).into());
+        let place = globe.place(p);
+        let g = globe.ground_at(place, angle * at);
+        let normal = globe.normal(place, &g);
+        let level: f64 = (0..3).map(|k| normal[k] * place.up[k]).sum();
+        (globe.altitude(p) - g.height) * level
+    };
+    if found < truth {
+        gap(found).abs()
+    } else {
+        (0..=64)
+            .map(|k| -gap(truth + (found - truth) * f64::from(k) / 64.0))
+            .fold(0.0, f64::max)
+    }
+}
+
+#[test]
+fn rays_from_orbit_meet_the_ball() {
+    for (name, height, pitch, fov) in [
+        ("luna", 400e3, -25.0, 60.0),
+        ("luna", 2000e3, -60.0, 70.0),
+        ("luna", 10e3, -10.0, 60.0),
+        ("terra", 400e3, -20.0, 60.0),
+        ("terra", 400e3, -70.0, 4.0),
+        ("luna", 400e3, -50.0, 4.0),
+    ] {
+        let land = Land::named(name).unwrap();
+        let globe = land.globe::<f64>().unwrap();
+        let rows = 27;
+        let columns = rows * 16 / 9;
+        let (rays, angle, _) = rays(&globe, rows, height, pitch, fov);
+        let wide = f64::from(angle);
+        let programs = veduta::programs();
+        let found = ray_hits(gpu(), programs, &land, &rays, angle, RayPath::Fast).unwrap();
+        let truth = parallel_map(rays.len(), |i| globe.ray_hit(&rays[i], wide, 0.05).unwrap());
+        let met = |i: usize| truth[i].distance.is_finite();
+        let near_edge = |i: usize| {
+            let (x, y) = (i % columns, i / columns);
+            (-1..=1_i32).any(|dy| {
+                (-1..=1_i32).any(|dx| {
+                    let (x, y) = (x as i32 + dx, y as i32 + dy);
+                    x >= 0
+                        && y >= 0
+                        && x < columns as i32
+                        && y < rows as i32
+                        && met(y as usize * columns + x as usize) != met(i)
+                })
+            })
+        };
+        let (mut wrong, mut at_edge, mut capped) = (0, 0, 0);
+        let mut errors = Vec::new();
+        let mut tilts = Vec::new();
+        for (i, (f, t)) in found.iter().zip(&truth).enumerate() {
+            capped += i32::from(f.capped);
+            match (f.distance.is_finite(), t.distance.is_finite()) {
+                (true, true) => {
+                    let off = across(&globe, &rays[i], wide, f.distance, t.distance);
+                    errors.push(off / (wide * t.distance).max(0.05));
+                    let cosine: f64 = (0..3).map(|k| f.normal[k] * t.normal[k]).sum();
+                    tilts.push(1.0 - cosine);
+                }
+                (false, false) => {}
+                _ if near_edge(i) => at_edge += 1,
+                _ => wrong += 1,
+            }
+        }
+        errors.sort_by(f64::total_cmp);
+        tilts.sort_by(f64::total_cmp);
+        let centile =
+            |sorted: &[f64], share: f64| sorted[((sorted.len() - 1) as f64 * share) as usize];
+        let count = rays.len() as f64;
+        println!(
+            "{name}, {height} m, {fov} degrees: {} hits of {count}; wrong {:.3} %, at the silhouette {:.3} %, capped {capped}; error in footprints: median {:.4}, 95 % {:.4}, 99 % {:.4}, normals 99 % {:.1e}",
+            errors.len(),
+            100.0 * f64::from(wrong) / count,
+            100.0 * f64::from(at_edge) / count,
+            centile(&errors, 0.5),
+            centile(&errors, 0.95),
+            centile(&errors, 0.99),
+            centile(&tilts, 0.99),
+        );
+        assert!(errors.len() > 200, "{name}");
+        assert!(f64::from(wrong) <= 2e-4 * count, "{name}: {wrong}");
+        assert!(f64::from(at_edge) <= 3e-3 * count, "{name}: {at_edge}");
+        assert!(centile(&errors, 0.99) <= 0.5, "{name}");
+        assert!(centile(&tilts, 0.99) <= 0.02, "{name}");
+        assert_eq!(capped, 0, "{name}");
+    }
+}
+
+#[test]
+fn the_march_over_a_ball_comes_close() {
+    let land = Land::named("luna").unwrap();
+    let globe = land.globe::<f64>().unwrap();
+    let (rays, angle, _) = rays(&globe, 18, 400e3, -40.0, 50.0);
+    let programs = veduta::programs();
+    let found = ray_hits(gpu(), programs, &land, &rays, angle, RayPath::Textbook).unwrap();
+    let mut apart = 0;
+    for (ray, f) in rays.iter().zip(&found) {
+        let t = globe.ray_hit(ray, f64::from(angle), 0.05).unwrap();
+        let footprint = f64::from(angle) * t.distance;
+        apart += i32::from(
+            t.distance.is_finite() != f.distance.is_finite()
+                || (t.distance.is_finite() && (t.distance - f.distance).abs() > 8.0 * footprint),
+        );
+    }
+    println!("{apart} of {} apart", rays.len());
+    assert!(apart * 50 <= rays.len() as i32);
+}
+
+/// Judges the program `terrain_globe`: what it covers and the depth that it writes.
+#[test]
+fn a_ball_is_drawn_where_rays_meet_it_with_their_depth() {
+    use veduta::glam::Vec3;
+    use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
+    let land = Land::named("luna").unwrap();
+    let globe = land.globe::<f64>().unwrap();
+    let (rows, columns) = (36, 64);
+    let targets = veduta::Targets {
+        color_format: wgpu::TextureFormat::Rgba32Float,
+        depth_format: Some(wgpu::TextureFormat::Depth32Float),
+        ..Default::default()
+    };
+    let options = TerrainOptions {
+        land: land.clone(),
+        far: 1e9,
+        ..Default::default()
+    };
+    let gpu = gpu();
+    let mut terrain = Terrain::new(&gpu.device, veduta::programs(), &targets, &options).unwrap();
+    assert!(terrain.clipmap().is_none());
+    let lights = TerrainLights::clear(Vec3::ONE);
+    for (height, pitch) in [(400e3, -25.0), (2000e3, -60.0)] {
+        let (rays, angle, view) = rays(&globe, rows, height, pitch, 70.0);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let _ = terrain
+            .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+            .unwrap();
+        gpu.queue.submit([encoder.finish()]);
+        let (picture, depths, work) = crate::land::drawn(&terrain, columns, rows, 0.0);
+        assert_eq!(work.draws, 1);
+        assert!(picture.iter().all(|v| v.is_finite()));
+        let path = RayPath::Fast;
+        let found = ray_hits(gpu, veduta::programs(), &land, &rays, angle, path).unwrap();
+        let forward = view
+            .world_from_view
+            .transform_vector3(Vec3::NEG_Z)
+            .as_dvec3();
+        let apart = |(i, h): &(usize, &TerrainHit)| h.distance.is_finite() != (depths[*i] > 0.0);
+        let apart = found.iter().enumerate().filter(apart).count();
+        let mut off: Vec<f64> = Vec::new();
+        for (i, h) in found.iter().enumerate() {
+            if h.distance.is_finite() && depths[i] > 0.0 {
+                let ahead = h.distance * forward.dot(rays[i].dir.into());
+                let drawn = 0.1 / f64::from(depths[i]);
+                off.push((drawn - ahead).abs() / (f64::from(angle) * h.distance));
+            }
+        }
+        off.sort_by(f64::total_cmp);
+        let high = off[off.len() * 98 / 100];
+        println!(
+            "{height} m: {} hits, {apart} apart, depth off by {high:.3} footprints at 98 %",
+            off.len()
+        );
+        assert!(off.len() > 300 && apart <= 4, "{height}: {apart}");
+        assert!(high <= 0.5, "{height}: {high}");
+    }
+    // Away from the ball nothing is drawn.
+    let (_, _, view) = rays(&globe, rows, 2000e3, 60.0, 50.0);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let _ = terrain
+        .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+        .unwrap();
+    gpu.queue.submit([encoder.finish()]);
+    assert_eq!(crate::land::drawn(&terrain, columns, rows, 0.0).2.draws, 0);
+}
+
+#[test]
+fn faults_on_a_ball_name_what_is_wrong() {
+    let good = Land::named("luna").unwrap();
+    let fault = |change: fn(&mut Land)| {
+        let mut land = good.clone();
+        change(&mut land);
+        land.check().unwrap_err().to_string()
+    };
+    let text = fault(|l| l.field.kind = Kind::Mix { mountains: 2.0 });
+    assert!(
+        text.contains("field.kind") && text.contains("Sphere"),
+        "{text}"
+    );
+    let text = fault(|l| l.field.wavelength = 900_000.0);
+    assert!(text.contains("field.wavelength"), "{text}");
+    let text = fault(|l| {
+        l.field.domain = Domain::Plane;
+        l.sea = Land::named("terra").unwrap().sea;
+    });
+    assert!(text.contains("land.sea"), "{text}");
+    let text = good.field.prepare::<f32>().unwrap_err().to_string();
+    assert!(text.contains("Land::globe"), "{text}");
+    let text = Land::default().globe::<f32>().unwrap_err().to_string();
+    assert!(text.contains("domain"), "{text}");
+}
+
+/// Judges `View::levelled`: the eye's altitude, and angles with what is up.
+#[test]
+fn a_levelled_view_stands_upright() {
+    let land = Land::named("terra").unwrap();
+    let globe = land.globe::<f64>().unwrap();
+    let (_, _, mut view) = rays(&globe, 4, 400e3, -20.0, 60.0);
+    view.sun.to_light = veduta::glam::Vec3::new(0.6, 0.0, -0.8);
+    let level = view.levelled(land.planet_radius);
+    assert!((level.eye.altitude() - 400e3).abs() < 0.1);
+    let up = globe.place(view.eye).up;
+    let [a, b] = [view.rays().unwrap()[0], level.rays().unwrap()[0]].map(|r| r.normalize());
+    let before = a.as_dvec3().dot(up.into());
+    assert!((before - f64::from(b.y)).abs() < 1e-6, "{before} {}", b.y);
+    let sun = view.sun.to_light.as_dvec3().dot(up.into());
+    assert!((sun - f64::from(level.sun.to_light.y)).abs() < 1e-6);
+    assert!((a.dot(view.sun.to_light) - b.dot(level.sun.to_light)).abs() < 1e-6);
+}

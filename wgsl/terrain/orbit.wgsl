@@ -1,0 +1,133 @@
+//! Rays over a height field on a ball, seen from far away: the field itself is followed, since a footprint leaves few octaves of it.
+//!
+//! A ray starts where it comes below the highest ground. From a place where it is clear by c it is clear for c / (L s - r) more, where r is how much of it points up, s
+//! how much level, and L the steepest slope: altitude over a ball is convex. That holds of the field, and of the sum of its first octaves, when all that the others can add is taken
+//! off c, with the slope of these alone; octaves are added only until the step is long enough. A ray goes half a footprint at the least, as the reference does, and farther when it
+//! has used half of its steps. Between the last clear place and the first that is not, the crossing is bracketed by regula falsi that keeps to the inner four fifths.
+//!
+//! source   Galin2020 (local Lipschitz bounds); the tangent and the bracket: ours
+//! symbols  dir unit direction along the world's axes [1] · pixel_angle angle of a pixel [rad], so that the footprint is pixel_angle t · before what the ray has come already [m]
+#define_import_path veduta::terrain::orbit
+
+#import veduta::terrain::globe::{Globe, GlobeGround, globe_altitude, globe_up, globe_at, globe_frac, globe_octaves}
+
+/// What a ray from the eye found.
+struct GlobeHit {
+    /// Distance of the hit [m]; -1 if there is none.
+    distance: f32,
+    /// Unit vector away from the ground along the world's axes.
+    normal: vec3<f32>,
+    /// The field there.
+    ground: GlobeGround,
+    /// Steps taken; all of them when the ray ran out of them.
+    steps: i32,
+}
+
+/// Distances at which a ray from the eye meets the sphere at an altitude: near, far, and 1 when it does.
+///
+/// internal
+fn globe_span(globe: Globe, dir: vec3<f32>, altitude: f32) -> vec3<f32> {
+    let b = (globe.ground_radius + globe.eye_altitude) * dot(dir, globe.up);
+    let c = (globe.eye_altitude - altitude) * (2.0 * globe.ground_radius + globe.eye_altitude + altitude);
+    let discriminant = b * b - c;
+    let root = sqrt(max(discriminant, 0.0));
+    let large = select(-b + root, -b - root, b >= 0.0);
+    let small = c / select(large, 1.0, large == 0.0);
+    return vec3<f32>(min(large, small), max(large, small), select(0.0, 1.0, discriminant >= 0.0));
+}
+
+/// First place where a ray from the eye meets the ground before `far`, for a ray that has come `before` metres already, which count for its footprint. A ray that uses up `max_steps` has met it if it leads below all ground.
+///
+/// internal
+fn globe_hit(globe: Globe, kind: i32, dir: vec3<f32>, before: f32, far: f32, pixel_angle: f32, max_steps: i32) -> GlobeHit {
+    var hit = GlobeHit(-1.0, globe.up, GlobeGround(0.0, vec3<f32>(0.0), 0.0), 0);
+    // What f32 leaves uncertain about a tangent ray.
+    let margin = 2.0 + 5e-7 * (globe.ground_radius + globe.eye_altitude);
+    let outer = globe_span(globe, dir, globe.high + margin);
+    let inner = globe_span(globe, dir, globe.low - margin);
+    let inside = inner.z > 0.0 && inner.y > 0.0;
+    let near = max(outer.x, 0.0);
+    let end = min(select(outer.y, max(inner.x, 0.0) + margin, inside), far);
+    var count = select(0, max_steps, outer.z > 0.0 && outer.y > 0.0 && near < end);
+    var t = near;
+    var clear = near;
+    var clear_by = 0.0;
+    var below = -1.0;
+    var below_by = 0.0;
+    var done = count == 0;
+    while hit.steps < count && !done {
+        hit.steps += 1;
+        let at = dir * t;
+        let footprint = pixel_angle * (before + t);
+        let altitude = globe_altitude(globe, at);
+        let up = globe_up(globe, at);
+        let rise = dot(up, dir);
+        let level = sqrt(max(1.0 - rise * rise, 0.0));
+        let least = max(0.5 * footprint, 0.05) * exp2(16.0 * max(f32(hit.steps) / f32(max_steps) - 0.5, 0.0));
+        let enough = select(4.0 * least, 1e30, below >= 0.0);
+        let probe = globe_octaves(globe, kind, globe.cell, globe_frac(globe, at, altitude), up, footprint, altitude, rise, level, enough);
+        let early = probe.step >= enough;
+        let ground = probe.ground;
+        let clearance = select(altitude - ground.height, probe.clear, early);
+        if clearance <= 0.0 {
+            below = t;
+            below_by = clearance;
+        } else {
+            clear = t;
+            clear_by = clearance;
+        }
+        if below >= 0.0 && (abs(clearance) < 0.01 * footprint || below - clear < 0.01 * footprint) {
+            done = true;
+            hit.distance = t;
+            hit.ground = ground;
+            let shrink = globe.ground_radius / (globe.ground_radius + altitude);
+            let gradient = up - shrink * ground.slope;
+            hit.normal = gradient * inverseSqrt(max(dot(gradient, gradient), 1e-12));
+        } else if below >= 0.0 {
+            t = clear + (below - clear) * clamp(clear_by / max(clear_by - below_by, 1e-9), 0.1, 0.9);
+        } else {
+            let full = select(clearance / max(globe.steepest * level - rise, 1e-3), 0.0, early);
+            done = t >= end;
+            t = min(t + max(max(probe.step, full), least), end);
+        }
+    }
+    if done {
+        // All steps mean that there were too few.
+        hit.steps = min(hit.steps, max_steps - 1);
+    } else if below >= 0.0 || inside {
+        hit.distance = t;
+        hit.ground = globe_at(globe, kind, dir * t, pixel_angle * (before + t));
+        let gradient = globe_up(globe, dir * t) - hit.ground.slope;
+        hit.normal = gradient * inverseSqrt(max(dot(gradient, gradient), 1e-12));
+    }
+    return hit;
+}
+
+/// Share of the disc of a light of the angular radius whose tangent is `width` that is seen from a place on the ground of the footprint `footprint`. Crests between steps
+/// that grow with the distance may be passed.
+///
+/// internal
+fn globe_shadow(globe: Globe, kind: i32, origin: vec3<f32>, to_light: vec3<f32>, width: f32, footprint: f32, max_steps: i32) -> f32 {
+    var least = 1.0;
+    let first = 1.5 * footprint;
+    var t = first;
+    for (var i = 0; i < max_steps; i++) {
+        let at = origin + to_light * t;
+        let altitude = globe_altitude(globe, at);
+        let up = globe_up(globe, at);
+        let rise = dot(up, to_light);
+        if least <= -1.0 || (rise >= 0.0 && altitude > globe.high) {
+            break;
+        }
+        let level = sqrt(max(1.0 - rise * rise, 0.0));
+        let own = max(footprint, 0.06 * t);
+        let probe = globe_octaves(globe, kind, globe.cell, globe_frac(globe, at, altitude), up, footprint + 0.5 * width * t, altitude, rise, level, 4.0 * own);
+        let early = probe.step >= 4.0 * own;
+        let clearance = select(altitude - probe.ground.height, probe.clear, early);
+        // The shadow's border is as wide as the penumbra and the footprint together.
+        least = min(least, clearance / (width * t + 0.35 * footprint));
+        t += max(max(select(0.7 * clearance, 0.0, early), probe.step), own);
+    }
+    let x = clamp(least, -1.0, 1.0);
+    return clamp(0.5 + x * (0.75 - 0.25 * x * x), 0.0, 1.0);
+}
