@@ -74,16 +74,11 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             let ways: [&[&str]; 7] = [
                 &[],
                 &["CLOUD_READS_NODES"],
-                &["CLOUD_BAKES", "CLOUD_NODES"],
-                &["CLOUD_BAKES", "CLOUD_CELLS", "CLOUD_READS_NODES"],
-                &["CLOUD_BAKES", "CLOUD_DIRECTIONS", "CLOUD_SWEEP"],
-                &["CLOUD_BAKES", "CLOUD_DIRECTIONS", "CLOUD_GATHER"],
-                &[
-                    "CLOUD_BAKES",
-                    "CLOUD_DIRECTIONS",
-                    "CLOUD_GATHER",
-                    "CLOUD_PROLONG",
-                ],
+                &["CLOUD_NODES"],
+                &["CLOUD_CELLS"],
+                &["CLOUD_SWEEP"],
+                &["CLOUD_GATHER"],
+                &["CLOUD_GATHER", "CLOUD_PROLONG"],
             ];
             let set = |flags: &&[&str]| flags.iter().map(|f| (*f).to_owned()).collect();
             return ways.iter().map(set).collect();

@@ -302,9 +302,6 @@ impl<'a> Solver<'a> {
             ..Default::default()
         };
         let kernel = |flags: &[&str]| compute(device, programs, "cloud_volume", flags, &[]);
-        let cells = ["CLOUD_BAKES", "CLOUD_CELLS", "CLOUD_READS_NODES"];
-        let ways =
-            |last: &[&'static str]| kernel(&[&["CLOUD_BAKES", "CLOUD_DIRECTIONS"], last].concat());
         let density: Vec<u8> = cube.density.iter().flat_map(|d| d.to_le_bytes()).collect();
         let peaks: Vec<u8> = lobes
             .peak_table()
@@ -317,11 +314,11 @@ impl<'a> Solver<'a> {
             block,
             density: filled(gpu, &density),
             peaks: filled(gpu, &peaks),
-            nodes: kernel(&["CLOUD_BAKES", "CLOUD_NODES"])?,
-            fill: kernel(&cells)?,
-            sweep: ways(&["CLOUD_SWEEP"])?,
-            gather: ways(&["CLOUD_GATHER"])?,
-            prolong: ways(&["CLOUD_GATHER", "CLOUD_PROLONG"])?,
+            nodes: kernel(&["CLOUD_NODES"])?,
+            fill: kernel(&["CLOUD_CELLS"])?,
+            sweep: kernel(&["CLOUD_SWEEP"])?,
+            gather: kernel(&["CLOUD_GATHER"])?,
+            prolong: kernel(&["CLOUD_GATHER", "CLOUD_PROLONG"])?,
             rays: kernel(if textbook {
                 &[]
             } else {
@@ -429,28 +426,28 @@ impl<'a> Solver<'a> {
             let bound: [&[_]; 3] = [
                 &[(0, &uniform)],
                 &[(0, &self.density), (1, &depths)],
-                &[(0, &cells)],
+                &[(1, &cells)],
             ];
             let groups = self.groups(&self.fill, bound);
             self.dispatch(&mut encoder, &self.fill, &groups, count.div_ceil(64));
-            let gathered = |kernel: &Kernel, uniform: &wgpu::Buffer, from: &wgpu::Buffer| {
+            let gathered = |kernel: &Kernel, place: u32, from: &wgpu::Buffer| {
                 let bound: [&[_]; 3] = [
-                    &[(0, uniform)],
-                    &[(2, &ways), (3, &cells), (4, from)],
-                    &[(0, &source), (1, &moments)],
+                    &[(0, &uniform)],
+                    &[(2, &ways), (3, &cells), (place, from)],
+                    &[(3, &source), (4, &moments)],
                 ];
                 self.groups(kernel, bound)
             };
-            let gather = gathered(&self.gather, &uniform, &radiance);
+            let gather = gathered(&self.gather, 5, &radiance);
             let bound: [&[_]; 3] = [
                 &[(0, &uniform)],
                 &[(2, &ways), (3, &cells), (4, &source)],
-                &[(0, &radiance)],
+                &[(2, &radiance)],
             ];
             let sweep = self.groups(&self.sweep, bound);
             match &coarser {
                 Some((coarse, _)) => {
-                    let prolong = gathered(&self.prolong, &uniform, coarse);
+                    let prolong = gathered(&self.prolong, 6, coarse);
                     self.dispatch(&mut encoder, &self.prolong, &prolong, count.div_ceil(64));
                 }
                 None => {
@@ -520,16 +517,16 @@ impl<'a> Solver<'a> {
         let mut read = vec![
             (0, &self.density),
             (1, &prepared.depths),
-            (2, &exchange.input),
-            (3, &self.peaks),
-            (4, &prepared.moments),
+            (7, &exchange.input),
+            (8, &self.peaks),
+            (9, &prepared.moments),
         ];
         if self.options.path == ProbePath::Textbook {
             read.remove(1);
         }
         let groups = self.groups(
             &self.rays,
-            [&[(0, &uniform)], &read, &[(0, &exchange.output)]],
+            [&[(0, &uniform)], &read, &[(5, &exchange.output)]],
         );
         let encoder = device.create_command_encoder(&Default::default());
         let workgroups = rays.len().div_ceil(64) as u32;

@@ -57,15 +57,23 @@ fn march_tile(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, ground_r
     let count = select(0, max(steps, 1), size > 0.0);
     let ds = size / f32(max(count, 1));
     let scale = 0.5 * layer.extinction * ds;
+    // Altitudes by a parabola about the middle of the segment.
+    let middle = 0.5 * (segment.near + segment.far);
+    let level = altitude_along(ground_radius, eye_altitude, dir.y, middle);
+    let radius = ground_radius + level;
+    let rise = clamp(((ground_radius + eye_altitude) * dir.y + middle) / radius, -1.0, 1.0);
+    let bend = 0.5 * (1.0 - rise * rise) / radius;
     let start = segment_distance(segment, 0.0);
-    var here = tile_at(tile, linear, layer, dir.xz * start, altitude_along(ground_radius, eye_altitude, dir.y, start));
+    let before = start - middle;
+    var here = tile_at(tile, linear, layer, dir.xz * start, level + before * (rise + before * bend));
     var transmittance = 1.0;
     var scatter = 0.0;
     var weighted = 0.0;
     var samples = 0;
     for (var i = 1; i <= count && transmittance > min_transmittance; i++) {
         let t = segment_distance(segment, f32(i) * ds);
-        let next = tile_at(tile, linear, layer, dir.xz * t, altitude_along(ground_radius, eye_altitude, dir.y, t));
+        let off = t - middle;
+        let next = tile_at(tile, linear, layer, dir.xz * t, level + off * (rise + off * bend));
         let depth = scale * (here.x + next.x);
         let left = transmittance * exp(-depth);
         scatter += transmittance * step_light(depth, here.y, next.y);

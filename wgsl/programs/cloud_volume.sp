@@ -10,14 +10,9 @@ orders a table of depth and angle holds.
 #COMPUTE{
     #CODE{
 #import veduta::clouds::harmonics::{Harmonics, harmonics}
-#ifdef CLOUD_SWEEP
-#import veduta::math::series::{one_minus_exp_over_x}
-#endif
-#ifndef CLOUD_BAKES
 #import veduta::clouds::integral::{step_light}
 #import veduta::lighting::phase::{phase_henyey_greenstein}
-#import veduta::math::series::{one_minus_exp}
-#endif
+#import veduta::math::series::{one_minus_exp, one_minus_exp_over_x}
 
 struct CloudGrid {
     // Cells of the light of many orders.
@@ -53,7 +48,6 @@ struct CloudGrid {
 
 @group(0) @binding(0) var<uniform> grid: CloudGrid;
 
-#ifndef CLOUD_DIRECTIONS
 @group(1) @binding(0) var<storage, read> density: array<f32>;
 
 fn voxel(at: vec3<i32>) -> f32 {
@@ -71,9 +65,7 @@ fn density_at(point: vec3<f32>) -> f32 {
     let far = mix(mix(voxel(k + vec3<i32>(0, 0, 1)), voxel(k + vec3<i32>(1, 0, 1)), f.x), mix(voxel(k + vec3<i32>(0, 1, 1)), voxel(k + vec3<i32>(1, 1, 1)), f.x), f.y);
     return mix(near, far, f.z);
 }
-#endif
 
-#ifndef CLOUD_DIRECTIONS
 // Distances at which a ray enters and leaves the unit cube; the second is below the first where it misses.
 fn cube_span(origin: vec3<f32>, dir: vec3<f32>) -> vec2<f32> {
     let d = select(dir, vec3<f32>(1e-9), abs(dir) < vec3<f32>(1e-9));
@@ -94,9 +86,7 @@ fn marched_depth(point: vec3<f32>) -> f32 {
     }
     return sum * ds * grid.size * grid.extinction;
 }
-#endif
 
-#ifdef CLOUD_READS_NODES
 @group(1) @binding(1) var<storage, read> nodes: array<f32>;
 
 fn node(at: vec3<i32>) -> f32 {
@@ -112,50 +102,12 @@ fn baked_depth(point: vec3<f32>) -> f32 {
     let far = mix(mix(node(k + vec3<i32>(0, 0, 1)), node(k + vec3<i32>(1, 0, 1)), f.x), mix(node(k + vec3<i32>(0, 1, 1)), node(k + vec3<i32>(1, 1, 1)), f.x), f.y);
     return mix(near, far, f.z);
 }
-#endif
 
-#ifdef CLOUD_NODES
 @group(2) @binding(0) var<storage, read_write> depths: array<f32>;
 
-@compute @workgroup_size(64)
-fn find_depths(@builtin(global_invocation_id) id: vec3<u32>) {
-    let n = grid.nodes;
-    let i = i32(id.x);
-    if i >= n * n * n {
-        return;
-    }
-    let at = vec3<f32>(vec3<i32>(i % n, (i / n) % n, i / (n * n))) / f32(n - 1);
-    depths[i] = marched_depth(at);
-}
-#endif
-
-#ifdef CLOUD_CELLS
 // Extinction without the peak [1/m] and the mean of the sun's light over what there is in the cell.
-@group(2) @binding(0) var<storage, read_write> filled: array<vec2<f32>>;
+@group(2) @binding(1) var<storage, read_write> filled: array<vec2<f32>>;
 
-@compute @workgroup_size(64)
-fn fill(@builtin(global_invocation_id) id: vec3<u32>) {
-    let n = grid.cells;
-    let i = i32(id.x);
-    if i >= n.x * n.y * n.z {
-        return;
-    }
-    let corner = vec3<f32>(vec3<i32>(i % n.x, (i / n.x) % n.y, i / (n.x * n.y)));
-    let kept = 1.0 - grid.albedo * grid.peak;
-    var sum = 0.0;
-    var lit = 0.0;
-    for (var j = 0; j < 64; j++) {
-        let part = (vec3<f32>(f32(j & 3), f32((j >> 2u) & 3), f32(j >> 4u)) + 0.5) * 0.25;
-        let point = (corner + part) / vec3<f32>(n);
-        let rho = density_at(point);
-        sum += rho;
-        lit += rho * exp(-kept * baked_depth(point));
-    }
-    filled[i] = vec2<f32>(kept * grid.extinction * sum / 64.0, lit / max(sum, 1e-30));
-}
-#endif
-
-#ifdef CLOUD_DIRECTIONS
 struct Way {
     zeroth: vec4<f32>,
     second: vec4<f32>,
@@ -169,128 +121,16 @@ struct Way {
 }
 
 @group(1) @binding(2) var<storage, read> ways: array<Way>;
-#endif
 
-#ifdef CLOUD_SWEEP
 @group(1) @binding(3) var<storage, read> cells: array<vec2<f32>>;
 @group(1) @binding(4) var<storage, read> source: array<f32>;
-@group(2) @binding(0) var<storage, read_write> radiance: array<f32>;
+@group(2) @binding(2) var<storage, read_write> radiance: array<f32>;
 
-@compute @workgroup_size(256)
-fn sweep(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let way = ways[group.x];
-    let all = grid.cells.x * grid.cells.y * grid.cells.z;
-    let start = i32(group.x) * all;
-    let first = floor(way.shift.xy);
-    let part = way.shift.xy - first;
-    let plane_cells = way.counts.y * way.counts.z;
-    for (var plane = 0; plane < way.counts.x; plane++) {
-        let k = select(plane, way.counts.x - 1 - plane, way.counts.w < 0);
-        let before = k - way.counts.w;
-        let has_before = before >= 0 && before < way.counts.x;
-        for (var c = i32(lane); c < plane_cells; c += 256) {
-            let a = c % way.counts.y;
-            let b = c / way.counts.y;
-            let here = k * way.strides.x + a * way.strides.y + b * way.strides.z;
-            var sigma = 0.0;
-            var emitted = 0.0;
-            var arriving = 0.0;
-            for (var j = 0; j < 4; j++) {
-                let ja = j & 1;
-                let jb = j >> 1u;
-                let ka = a + i32(first.x) + ja;
-                let kb = b + i32(first.y) + jb;
-                let weight = select(1.0 - part.x, part.x, ja == 1) * select(1.0 - part.y, part.y, jb == 1);
-                let inside = has_before && ka >= 0 && ka < way.counts.y && kb >= 0 && kb < way.counts.z;
-                let at = select(here, before * way.strides.x + ka * way.strides.y + kb * way.strides.z, inside);
-                let thickness = select(0.0, weight * cells[at].x, inside);
-                sigma += thickness;
-                emitted += thickness * source[start + at];
-                arriving += weight * select(grid.uniform_light, radiance[start + at], inside);
-            }
-            let own = source[start + here];
-            let sent = select(own, emitted / max(sigma, 1e-30), sigma > 1e-30);
-            let depth = 0.5 * (sigma + cells[here].x) * way.shift.z;
-            let left = exp(-depth);
-            let mean = one_minus_exp_over_x(depth);
-            radiance[start + here] = arriving * left + sent * (mean - left) + own * (1.0 - mean);
-        }
-        storageBarrier();
-    }
-}
-#endif
+@group(1) @binding(5) var<storage, read> arrived: array<f32>;
+@group(1) @binding(6) var<storage, read> coarser: array<vec4<f32>>;
+@group(2) @binding(3) var<storage, read_write> sent: array<f32>;
+@group(2) @binding(4) var<storage, read_write> found_moments: array<vec4<f32>>;
 
-#ifdef CLOUD_GATHER
-@group(1) @binding(3) var<storage, read> cells: array<vec2<f32>>;
-#ifdef CLOUD_PROLONG
-@group(1) @binding(4) var<storage, read> coarser: array<vec4<f32>>;
-#else
-@group(1) @binding(4) var<storage, read> radiance: array<f32>;
-#endif
-@group(2) @binding(0) var<storage, read_write> source: array<f32>;
-@group(2) @binding(1) var<storage, read_write> moments: array<vec4<f32>>;
-
-// What a cell scatters into each direction, from what comes to it and from the sun.
-@compute @workgroup_size(64)
-fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
-    let n = grid.cells;
-    let i = i32(id.x);
-    let all = n.x * n.y * n.z;
-    if i >= all {
-        return;
-    }
-    var sum = Harmonics(vec4<f32>(0.0), vec4<f32>(0.0), vec4<f32>(0.0), vec4<f32>(0.0));
-    let count = i32(arrayLength(&ways));
-    let d = grid.degrees;
-    let d_zeroth = vec4<f32>(d.x, d.y, d.y, d.y);
-    let d_middle = vec4<f32>(d.z, d.w, d.w, d.w);
-#ifdef CLOUD_PROLONG
-    let place = vec3<f32>(vec3<i32>(i % n.x, (i / n.x) % n.y, i / (n.x * n.y))) + 0.5;
-    let q = clamp(place / vec3<f32>(n) * vec3<f32>(grid.coarse) - 0.5, vec3<f32>(0.0), vec3<f32>(grid.coarse - 1));
-    let base = floor(q);
-    for (var j = 0; j < 8; j++) {
-        let offset = vec3<i32>(j & 1, (j >> 1u) & 1, j >> 2u);
-        let k = min(vec3<i32>(base) + offset, grid.coarse - 1);
-        let f = q - base;
-        let w = select(1.0 - f, f, offset == vec3<i32>(1));
-        let weight = w.x * w.y * w.z;
-        let at = 4 * ((k.z * grid.coarse.y + k.y) * grid.coarse.x + k.x);
-        sum.zeroth += weight * coarser[at];
-        sum.second += weight * coarser[at + 1];
-        sum.middle += weight * coarser[at + 2];
-        sum.third += weight * coarser[at + 3];
-    }
-#else
-    let share = 12.566371 / f32(count);
-    for (var j = 0; j < count; j++) {
-        let light = share * radiance[j * all + i];
-        sum.zeroth += light * ways[j].zeroth;
-        sum.second += light * ways[j].second;
-        sum.middle += light * ways[j].middle;
-        sum.third += light * ways[j].third;
-    }
-    sum.zeroth *= d_zeroth;
-    sum.second *= d.z;
-    sum.middle *= d_middle;
-    sum.third *= d.w;
-#endif
-    moments[4 * i] = sum.zeroth;
-    moments[4 * i + 1] = sum.second;
-    moments[4 * i + 2] = sum.middle;
-    moments[4 * i + 3] = sum.third;
-    let straight = harmonics(-grid.to_sun);
-    let lit = grid.sun * cells[i].y;
-    sum.zeroth += lit * d_zeroth * straight.zeroth;
-    sum.second += lit * d.z * straight.second;
-    sum.middle += lit * d_middle * straight.middle;
-    sum.third += lit * d.w * straight.third;
-    for (var j = 0; j < count; j++) {
-        source[j * all + i] = dot(sum.zeroth, ways[j].zeroth) + dot(sum.second, ways[j].second) + dot(sum.middle, ways[j].middle) + dot(sum.third, ways[j].third);
-    }
-}
-#endif
-
-#ifndef CLOUD_BAKES
 struct CubeRay {
     origin: vec3<f32>,
     dir: vec3<f32>,
@@ -301,11 +141,11 @@ struct CubeLight {
     transmittance: f32,
 }
 
-@group(1) @binding(2) var<storage, read> rays: array<CubeRay>;
+@group(1) @binding(7) var<storage, read> rays: array<CubeRay>;
 // Rows of angles, columns of depths.
-@group(1) @binding(3) var<storage, read> peaks: array<f32>;
-@group(1) @binding(4) var<storage, read> moments: array<vec4<f32>>;
-@group(2) @binding(0) var<storage, read_write> results: array<CubeLight>;
+@group(1) @binding(8) var<storage, read> peaks: array<f32>;
+@group(1) @binding(9) var<storage, read> moments: array<vec4<f32>>;
+@group(2) @binding(5) var<storage, read_write> results: array<CubeLight>;
 
 const PEAK_ANGLES: i32 = 128;
 const PEAK_DEPTHS: i32 = 64;
@@ -345,6 +185,144 @@ fn depth_to_sun(point: vec3<f32>) -> f32 {
 #endif
 }
 
+#ifdef CLOUD_NODES
+@compute @workgroup_size(64)
+fn find_depths(@builtin(global_invocation_id) id: vec3<u32>) {
+    let n = grid.nodes;
+    let i = i32(id.x);
+    if i >= n * n * n {
+        return;
+    }
+    let at = vec3<f32>(vec3<i32>(i % n, (i / n) % n, i / (n * n))) / f32(n - 1);
+    depths[i] = marched_depth(at);
+}
+#else
+#ifdef CLOUD_CELLS
+@compute @workgroup_size(64)
+fn fill(@builtin(global_invocation_id) id: vec3<u32>) {
+    let n = grid.cells;
+    let i = i32(id.x);
+    if i >= n.x * n.y * n.z {
+        return;
+    }
+    let corner = vec3<f32>(vec3<i32>(i % n.x, (i / n.x) % n.y, i / (n.x * n.y)));
+    let kept = 1.0 - grid.albedo * grid.peak;
+    var sum = 0.0;
+    var lit = 0.0;
+    for (var j = 0; j < 64; j++) {
+        let part = (vec3<f32>(f32(j & 3), f32((j >> 2u) & 3), f32(j >> 4u)) + 0.5) * 0.25;
+        let point = (corner + part) / vec3<f32>(n);
+        let rho = density_at(point);
+        sum += rho;
+        lit += rho * exp(-kept * baked_depth(point));
+    }
+    filled[i] = vec2<f32>(kept * grid.extinction * sum / 64.0, lit / max(sum, 1e-30));
+}
+#else
+#ifdef CLOUD_SWEEP
+@compute @workgroup_size(256)
+fn sweep(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let way = ways[group.x];
+    let all = grid.cells.x * grid.cells.y * grid.cells.z;
+    let start = i32(group.x) * all;
+    let first = floor(way.shift.xy);
+    let part = way.shift.xy - first;
+    let plane_cells = way.counts.y * way.counts.z;
+    for (var plane = 0; plane < way.counts.x; plane++) {
+        let k = select(plane, way.counts.x - 1 - plane, way.counts.w < 0);
+        let before = k - way.counts.w;
+        let has_before = before >= 0 && before < way.counts.x;
+        for (var c = i32(lane); c < plane_cells; c += 256) {
+            let a = c % way.counts.y;
+            let b = c / way.counts.y;
+            let here = k * way.strides.x + a * way.strides.y + b * way.strides.z;
+            var sigma = 0.0;
+            var emitted = 0.0;
+            var arriving = 0.0;
+            for (var j = 0; j < 4; j++) {
+                let ja = j & 1;
+                let jb = j >> 1u;
+                let ka = a + i32(first.x) + ja;
+                let kb = b + i32(first.y) + jb;
+                let weight = select(1.0 - part.x, part.x, ja == 1) * select(1.0 - part.y, part.y, jb == 1);
+                let inside = has_before && ka >= 0 && ka < way.counts.y && kb >= 0 && kb < way.counts.z;
+                let at = select(here, before * way.strides.x + ka * way.strides.y + kb * way.strides.z, inside);
+                let thickness = select(0.0, weight * cells[at].x, inside);
+                sigma += thickness;
+                emitted += thickness * source[start + at];
+                arriving += weight * select(grid.uniform_light, radiance[start + at], inside);
+            }
+            let own = source[start + here];
+            let upstream = select(own, emitted / max(sigma, 1e-30), sigma > 1e-30);
+            let depth = 0.5 * (sigma + cells[here].x) * way.shift.z;
+            let left = exp(-depth);
+            let mean = one_minus_exp_over_x(depth);
+            radiance[start + here] = arriving * left + upstream * (mean - left) + own * (1.0 - mean);
+        }
+        storageBarrier();
+    }
+}
+#else
+#ifdef CLOUD_GATHER
+// What a cell scatters into each direction, from what comes to it and from the sun.
+@compute @workgroup_size(64)
+fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
+    let n = grid.cells;
+    let i = i32(id.x);
+    let all = n.x * n.y * n.z;
+    if i >= all {
+        return;
+    }
+    var sum = Harmonics(vec4<f32>(0.0), vec4<f32>(0.0), vec4<f32>(0.0), vec4<f32>(0.0));
+    let count = i32(arrayLength(&ways));
+    let d = grid.degrees;
+    let d_zeroth = vec4<f32>(d.x, d.y, d.y, d.y);
+    let d_middle = vec4<f32>(d.z, d.w, d.w, d.w);
+#ifdef CLOUD_PROLONG
+    let place = vec3<f32>(vec3<i32>(i % n.x, (i / n.x) % n.y, i / (n.x * n.y))) + 0.5;
+    let q = clamp(place / vec3<f32>(n) * vec3<f32>(grid.coarse) - 0.5, vec3<f32>(0.0), vec3<f32>(grid.coarse - 1));
+    let base = floor(q);
+    for (var j = 0; j < 8; j++) {
+        let offset = vec3<i32>(j & 1, (j >> 1u) & 1, j >> 2u);
+        let k = min(vec3<i32>(base) + offset, grid.coarse - 1);
+        let f = q - base;
+        let w = select(1.0 - f, f, offset == vec3<i32>(1));
+        let weight = w.x * w.y * w.z;
+        let at = 4 * ((k.z * grid.coarse.y + k.y) * grid.coarse.x + k.x);
+        sum.zeroth += weight * coarser[at];
+        sum.second += weight * coarser[at + 1];
+        sum.middle += weight * coarser[at + 2];
+        sum.third += weight * coarser[at + 3];
+    }
+#else
+    let share = 12.566371 / f32(count);
+    for (var j = 0; j < count; j++) {
+        let light = share * arrived[j * all + i];
+        sum.zeroth += light * ways[j].zeroth;
+        sum.second += light * ways[j].second;
+        sum.middle += light * ways[j].middle;
+        sum.third += light * ways[j].third;
+    }
+    sum.zeroth *= d_zeroth;
+    sum.second *= d.z;
+    sum.middle *= d_middle;
+    sum.third *= d.w;
+#endif
+    found_moments[4 * i] = sum.zeroth;
+    found_moments[4 * i + 1] = sum.second;
+    found_moments[4 * i + 2] = sum.middle;
+    found_moments[4 * i + 3] = sum.third;
+    let straight = harmonics(-grid.to_sun);
+    let lit = grid.sun * cells[i].y;
+    sum.zeroth += lit * d_zeroth * straight.zeroth;
+    sum.second += lit * d.z * straight.second;
+    sum.middle += lit * d_middle * straight.middle;
+    sum.third += lit * d.w * straight.third;
+    for (var j = 0; j < count; j++) {
+        sent[j * all + i] = dot(sum.zeroth, ways[j].zeroth) + dot(sum.second, ways[j].second) + dot(sum.middle, ways[j].middle) + dot(sum.third, ways[j].third);
+    }
+}
+#else
 @compute @workgroup_size(64)
 fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     if i32(id.x) >= grid.count {
@@ -407,6 +385,9 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     scatter += grid.uniform_light * (exp(-kept * depth) - through);
     results[id.x] = CubeLight(scatter, through);
 }
+#endif
+#endif
+#endif
 #endif
     }#
 }#
