@@ -168,7 +168,6 @@ impl Tile {
             uniformity: deck.uniformity as f32,
             extinction: deck.extinction as f32,
             seed: deck.seed,
-            ..Default::default()
         };
         let (uniform, bound) = &self.slots[part as usize];
         let bytes = block.to_bytes();

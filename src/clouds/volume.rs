@@ -116,10 +116,10 @@ impl DensityCube {
         let mut sum = 0.0;
         for corner in 0..8 {
             let (mut weight, mut index, mut stride) = (1.0, 0, 1);
-            for k in 0..3 {
-                let base = q[k].floor();
+            for (k, place) in q.iter().enumerate() {
+                let base = place.floor();
                 let far = corner >> k & 1;
-                let part = q[k] - base;
+                let part = place - base;
                 weight *= if far == 1 { part } else { 1.0 - part };
                 let cell = (base as i64 + far).clamp(0, self.values[k] as i64 - 1);
                 index += cell as usize * stride;
