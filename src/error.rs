@@ -77,6 +77,14 @@ pub enum Error {
         /// The names that exist.
         known: Vec<String>,
     },
+    /// No layer of clouds has this name.
+    #[error("no clouds are called `{name}`; there are {}", list(.known))]
+    UnknownClouds {
+        /// The name asked for.
+        name: String,
+        /// The names that exist.
+        known: Vec<String>,
+    },
     /// A text is not the RON that it should be, or cannot be written as RON.
     #[error("{0}")]
     Ron(String),

@@ -6,6 +6,7 @@
 //! The WGSL is composed while this crate is built; [`programs()`] holds the variants of every shipped scene and preset.
 
 pub mod atmosphere;
+pub mod clouds;
 #[cfg(feature = "compose")]
 pub mod compose;
 pub mod device;

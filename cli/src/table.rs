@@ -286,6 +286,52 @@ impl Table {
     }
 }
 
+/// The shape and the numbers of an NPY file of `float32` with three dimensions in C order.
+///
+/// # Errors
+/// [`CliError::Read`], and [`CliError::Table`] for a malformed or truncated file, another type, order or shape.
+pub fn read_cube(path: &Path) -> Result<([usize; 3], Vec<f32>), CliError> {
+    let bytes = std::fs::read(path).map_err(|e| CliError::read(path, e))?;
+    let fault = |what: String| table(path, what);
+    check_npy_header(&bytes).map_err(&fault)?;
+    let mut rest = bytes.as_slice();
+    let header = npyz::NpyHeader::from_reader(&mut rest)
+        .map_err(|e| fault(format!("is no NPY file: {e}")))?;
+    let dtype = header.dtype();
+    let big = match &dtype {
+        npyz::DType::Plain(ty)
+            if ty.type_char() == npyz::TypeChar::Float && ty.size_field() == 4 =>
+        {
+            ty.endianness() == npyz::Endianness::Big
+        }
+        _ => {
+            let descr = dtype.descr();
+            return Err(fault(format!("the type is {descr}, but must be float32")));
+        }
+    };
+    let shape = header.shape();
+    let &[z, y, x] = shape else {
+        return Err(fault(format!(
+            "the shape is {shape:?}, but must be (values along z, along y, along x)"
+        )));
+    };
+    if header.order() == npyz::Order::Fortran && shape.iter().filter(|n| **n > 1).count() > 1 {
+        return Err(fault(
+            "the numbers lie in Fortran order, but must lie in C order (numpy.ascontiguousarray)"
+                .to_owned(),
+        ));
+    }
+    let expected = 4 * x * y * z;
+    if rest.len() as u64 != expected {
+        return Err(fault(format!(
+            "the shape {shape:?} needs {expected} bytes of numbers, but there are {}",
+            rest.len()
+        )));
+    }
+    let numbers = words::<4>(rest, big).map(f32::from_le_bytes).collect();
+    Ok(([z as usize, y as usize, x as usize], numbers))
+}
+
 type Misfit = (String, &'static str);
 
 fn whole_number_needed(ty: Column) -> &'static str {

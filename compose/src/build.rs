@@ -61,6 +61,28 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         "terrain_rays" | "terrain_globe_rays" => {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
+        "cloud_tile" => return vec![BTreeSet::new()],
+        "cloud_layer" | "cloud_probe" => {
+            let flag = if program == "cloud_layer" {
+                "CLOUD_OVER_DEPTH"
+            } else {
+                "CLOUD_TILE"
+            };
+            return vec![BTreeSet::new(), BTreeSet::from([flag.to_owned()])];
+        }
+        "cloud_volume" => {
+            let ways: [&[&str]; 7] = [
+                &[],
+                &["CLOUD_READS_NODES"],
+                &["CLOUD_NODES"],
+                &["CLOUD_CELLS"],
+                &["CLOUD_SWEEP"],
+                &["CLOUD_GATHER"],
+                &["CLOUD_GATHER", "CLOUD_PROLONG"],
+            ];
+            let set = |flags: &&[&str]| flags.iter().map(|f| (*f).to_owned()).collect();
+            return ways.iter().map(set).collect();
+        }
         _ => &[],
     };
     let set = |flags: &[&str]| flags.iter().map(|f| (*f).to_owned()).collect();

@@ -181,6 +181,35 @@ pub fn march_clouds(
     }
 }
 
+/// Share of the light that a step of even extinction scatters towards its start, where the depth towards the light changes evenly.
+pub fn step_light(depth: f64, near: f64, far: f64) -> f64 {
+    let end = depth + far;
+    depth * (-near.min(end)).exp() * super::math::one_minus_exp_over_x((end - near).abs())
+}
+
+/// Real spherical harmonics up to the third degree, orthonormal over the sphere, in the order of the module.
+pub fn harmonics([x, y, z]: [f64; 3]) -> [f64; 16] {
+    let root = |v: f64| (v / std::f64::consts::PI).sqrt();
+    [
+        root(0.25),
+        root(0.75) * y,
+        root(0.75) * z,
+        root(0.75) * x,
+        root(3.75) * x * y,
+        root(3.75) * y * z,
+        root(0.3125) * (3.0 * z * z - 1.0),
+        root(3.75) * x * z,
+        root(0.9375) * (x * x - y * y),
+        root(1.09375) * y * (3.0 * x * x - y * y),
+        root(26.25) * x * y * z,
+        root(0.65625) * y * (5.0 * z * z - 1.0),
+        root(0.4375) * z * (5.0 * z * z - 3.0),
+        root(0.65625) * x * (5.0 * z * z - 1.0),
+        root(6.5625) * z * (x * x - y * y),
+        root(1.09375) * x * (x * x - 3.0 * y * y),
+    ]
+}
+
 /// Radiance, seen from below, of a plane homogeneous slab of optical thickness `depth` that is lit from above by an
 /// irradiance of 1 and scatters once: zenith cosines `view_mu` and `sun_mu` > 0, phase function value `phase` [1/sr].
 pub fn slab_single_scatter(depth: f64, albedo: f64, phase: f64, view_mu: f64, sun_mu: f64) -> f64 {

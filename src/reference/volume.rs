@@ -5,8 +5,11 @@
 
 use super::math::{add, dot, length, scale};
 use super::monte_carlo::{Random, Tally, direction_about, sample_henyey_greenstein};
+use super::parallel::parallel_map;
 use super::phase::phase_double_henyey_greenstein;
 use super::quadrature::{Rule, Tolerance, integrate_kronrod};
+use crate::atmosphere::ProbeRay;
+use crate::clouds::{CloudDeck, CubeRay, DensityCube, Orders};
 
 /// Where a medium is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,13 +30,18 @@ pub enum Region {
         /// Altitude of the upper sphere.
         top: f64,
     },
+    /// A cube from 0 to `size` along each axis, in vacuum.
+    Cube {
+        /// Its edge.
+        size: f64,
+    },
 }
 
 impl Region {
     /// Altitude of a point.
     pub fn altitude(&self, point: [f64; 3]) -> f64 {
         match *self {
-            Self::Slab { .. } => point[1],
+            Self::Slab { .. } | Self::Cube { .. } => point[1],
             Self::Shell { ground_radius, .. } => {
                 length([point[0], point[1] + ground_radius, point[2]]) - ground_radius
             }
@@ -43,7 +51,7 @@ impl Region {
     /// Distances at which the ray crosses the surface at an altitude, the nearer first.
     fn crossings(&self, level: f64, origin: [f64; 3], dir: [f64; 3]) -> Option<(f64, f64)> {
         match *self {
-            Self::Slab { .. } => {
+            Self::Slab { .. } | Self::Cube { .. } => {
                 let t = (level - origin[1]) / dir[1];
                 t.is_finite().then_some((t, t))
             }
@@ -61,7 +69,7 @@ impl Region {
     /// Distance at which the ray meets the ground.
     fn ground(&self, origin: [f64; 3], dir: [f64; 3]) -> Option<f64> {
         match self {
-            Self::Slab { .. } => None,
+            Self::Slab { .. } | Self::Cube { .. } => None,
             Self::Shell { .. } => {
                 let (near, far) = self.crossings(0.0, origin, dir)?;
                 (far > 0.0 && near > -1e-6).then_some(near.max(0.0))
@@ -74,6 +82,25 @@ impl Region {
     pub fn stretches(&self, origin: [f64; 3], dir: [f64; 3], distance: f64) -> Vec<(f64, f64)> {
         let (bottom, top) = match *self {
             Self::Slab { bottom, top } | Self::Shell { bottom, top, .. } => (bottom, top),
+            Self::Cube { size } => {
+                let (mut near, mut far) = (0.0_f64, distance);
+                for k in 0..3 {
+                    if dir[k] == 0.0 {
+                        if !(0.0..=size).contains(&origin[k]) {
+                            return Vec::new();
+                        }
+                        continue;
+                    }
+                    let [a, b] = [0.0, size].map(|face| (face - origin[k]) / dir[k]);
+                    near = near.max(a.min(b));
+                    far = far.min(a.max(b));
+                }
+                return if near < far {
+                    vec![(near, far)]
+                } else {
+                    Vec::new()
+                };
+            }
         };
         let end = distance.min(self.ground(origin, dir).unwrap_or(f64::INFINITY));
         let mut cuts = vec![0.0, end];
@@ -416,6 +443,132 @@ impl<F: Fn([f64; 3]) -> f64> Volume<F> {
         }
         sum
     }
+}
+
+/// The light of rays through a cube of densities, on all cores: radiance, its error (one standard error for all orders) and transmittance.
+pub fn cube_light(
+    cube: &DensityCube,
+    rays: &[CubeRay],
+    orders: Orders,
+    paths: &VolumePaths,
+) -> Vec<[f64; 3]> {
+    let most = f64::from(cube.density.iter().copied().fold(0.0, f32::max));
+    let volume = Volume {
+        region: Region::Cube { size: cube.size },
+        density: |p: [f64; 3]| cube.density_at(p.map(|c| (c / cube.size).clamp(0.0, 1.0))),
+        // Rounding may lift a mean of equal values.
+        max_density: most * (1.0 + 1e-9) + 1e-30,
+        extinction: cube.extinction,
+        albedo: cube.albedo,
+        g_forward: cube.g,
+        g_backward: 0.0,
+        backward_share: 0.0,
+    };
+    parallel_map(rays.len(), |i| {
+        let ray = VolumeRay {
+            origin: scale(rays[i].origin, cube.size),
+            dir: rays[i].dir,
+            to_sun: rays[i].to_sun,
+            distance: f64::INFINITY,
+        };
+        if orders == Orders::Single {
+            let once = volume.single_scatter(&ray, 1e-5);
+            return [
+                once.scatter * paths.sun,
+                once.error * paths.sun,
+                once.transmittance,
+            ];
+        }
+        let depth = integrate_kronrod(
+            |t| [volume.extinction_at(add(ray.origin, scale(ray.dir, t)))],
+            &volume.region.stretches(ray.origin, ray.dir, ray.distance),
+            Tolerance {
+                relative: 1e-7,
+                absolute: 1e-7,
+                panels: 500,
+            },
+        );
+        let through = (-depth.value[0]).exp();
+        let (mean, error) = volume.trace(&ray, paths, i as u64);
+        [mean - paths.uniform * through, error, through]
+    })
+}
+
+/// The light of a layer alone along rays of the sky's kind, on all cores: radiance, its error (one standard error for all orders) and transmittance. Single
+/// scattering is found to about 1e-4.
+pub fn layer_light(
+    deck: &CloudDeck,
+    rays: &[ProbeRay],
+    orders: Orders,
+    paths: &VolumePaths,
+) -> Vec<[f64; 3]> {
+    if deck.is_empty() {
+        return vec![[0.0, 0.0, 1.0]; rays.len()];
+    }
+    let layer = super::clouds::CloudLayer {
+        cell: [0; 3],
+        frac: [0.0; 3],
+        wavelength: deck.wavelength,
+        period: 1 << deck.period_doublings,
+        octaves: 6,
+        hurst: 1.0,
+        bottom: deck.bottom,
+        thickness: deck.thickness,
+        coverage: deck.coverage,
+        uniformity: deck.uniformity,
+        extinction: deck.extinction,
+        albedo: deck.albedo,
+        g_forward: deck.g_forward,
+        g_backward: deck.g_backward,
+        backward_share: deck.backward_share,
+        seed: deck.seed,
+    };
+    let top = deck.bottom + deck.thickness;
+    let region = Region::Shell {
+        ground_radius: deck.planet_radius,
+        bottom: deck.bottom,
+        top,
+    };
+    let volume = Volume {
+        region,
+        density: |p: [f64; 3]| {
+            let altitude = region.altitude(p).clamp(deck.bottom, top);
+            super::clouds::cloud_density(&layer, [p[0], 0.0, p[2]], altitude)
+        },
+        max_density: 1.0 + 1e-12,
+        extinction: deck.extinction,
+        albedo: deck.albedo,
+        g_forward: deck.g_forward,
+        g_backward: deck.g_backward,
+        backward_share: deck.backward_share,
+    };
+    parallel_map(rays.len(), |i| {
+        let ray = VolumeRay {
+            origin: [0.0, rays[i].altitude, 0.0],
+            dir: rays[i].dir,
+            to_sun: rays[i].to_sun,
+            distance: rays[i].distance,
+        };
+        if orders == Orders::Single {
+            let once = volume.single_scatter(&ray, 1e-4);
+            return [
+                once.scatter * paths.sun,
+                once.error * paths.sun,
+                once.transmittance,
+            ];
+        }
+        let depth = integrate_kronrod(
+            |t| [volume.extinction_at(add(ray.origin, scale(ray.dir, t)))],
+            &volume.region.stretches(ray.origin, ray.dir, ray.distance),
+            Tolerance {
+                relative: 1e-5,
+                absolute: 1e-5,
+                panels: 2000,
+            },
+        );
+        let (mean, error) = volume.trace(&ray, paths, i as u64);
+        [mean, error, (-depth.value[0]).exp()]
+    })
 }
 
 /// A view ray through a volume.

@@ -5,6 +5,7 @@ mod air;
 mod atmosphere;
 mod clouds;
 mod common;
+mod cubes;
 mod depth;
 mod downstream;
 mod eval;

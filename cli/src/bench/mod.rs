@@ -2,6 +2,7 @@
 
 pub mod baseline;
 pub mod chapter6;
+pub mod clouds;
 pub mod knob;
 pub mod noise;
 pub mod plot;

@@ -6,7 +6,7 @@ use indicatif::ProgressBar;
 
 use crate::bench::knob::{self, Effect, Knob};
 use crate::bench::timing::{Clock, Rounds};
-use crate::bench::{Bench, baseline, chapter6, noise, presets, sky, terrain, write_text};
+use crate::bench::{Bench, baseline, chapter6, clouds, noise, presets, sky, terrain, write_text};
 use crate::catalog::{Catalog, SourceArgs};
 use crate::commands::render::{RenderArgs, read_json, write_json};
 use crate::error::CliError;
@@ -30,6 +30,8 @@ pub enum Subject {
     Sky,
     /// The terrain against that of the preset `thesis`.
     Terrain,
+    /// A layer of clouds at equal error, beside the loop of `thesis`.
+    Clouds,
 }
 
 /// Arguments of `veduta bench`.
@@ -161,7 +163,8 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 | Subject::Baseline
                 | Subject::Noise
                 | Subject::Sky
-                | Subject::Terrain,
+                | Subject::Terrain
+                | Subject::Clouds,
             ),
             Some(knob),
         ) => {
@@ -181,9 +184,13 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
         (
             "--views",
             as_given(&args.views),
-            others(&[Subject::Presets, Subject::Knob, Subject::Terrain])
-                || (subject == Subject::Knob && args.views.len() > 1),
-            "left out, or the subject `presets` or `terrain`, or one view of a knob",
+            others(&[
+                Subject::Presets,
+                Subject::Knob,
+                Subject::Terrain,
+                Subject::Clouds,
+            ]) || (matches!(subject, Subject::Knob | Subject::Clouds) && args.views.len() > 1),
+            "left out, or the subject `presets` or `terrain`, or one view of a knob or of clouds",
         ),
         (
             "--of",
@@ -332,6 +339,20 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 write_json(
                     &path.with_extension("json"),
                     &terrain::to_json(&bench, &report, &command),
+                )?;
+            }
+        }
+        Subject::Clouds => {
+            let view = args.views.first().map_or("V01", String::as_str);
+            let report = clouds::run(&bench, view, rounds.least, &mut progress)?;
+            bar.finish_and_clear();
+            let text = clouds::markdown(&bench, &report, &command);
+            print!("{text}");
+            if let Some(path) = &args.out {
+                write_text(path, &text)?;
+                write_json(
+                    &path.with_extension("json"),
+                    &clouds::to_json(&bench, &report, &command),
                 )?;
             }
         }

@@ -1,9 +1,10 @@
-//! `veduta probe`: the light along given rays, and heights of given places.
+//! `veduta probe`: the light along given rays, of the sky and of clouds, and heights of given places.
 
 use std::path::{Path, PathBuf};
 
 use veduta::Atmosphere;
 use veduta::atmosphere::{Orders, ProbeOptions, ProbePath, ProbeRay, SkyQuality, probe};
+use veduta::clouds::{CloudDeck, CubeOptions, CubeRay, DensityCube, cube_light, layer_light};
 use veduta::eval::ResultKind;
 use veduta::reference;
 use veduta::terrain::{Land, RayPath, TerrainRay, ray_hits};
@@ -11,7 +12,7 @@ use veduta::{Preset, Settings, WorldPos};
 
 use crate::error::CliError;
 use crate::image::check_folder;
-use crate::table::{Format, Table, write_results};
+use crate::table::{Format, Table, read_cube, write_results};
 
 /// Arguments of `veduta probe`.
 #[derive(Debug, Clone, clap::Args)]
@@ -30,6 +31,80 @@ pub enum What {
     Height(HeightArgs),
     /// Where rays meet a land
     Terrain(TerrainArgs),
+    /// Radiance and transmittance of clouds alone along rays
+    Clouds(CloudsArgs),
+}
+
+/// Arguments of `veduta probe clouds`.
+#[derive(Debug, Clone, clap::Args)]
+pub struct CloudsArgs {
+    /// A cube of densities, .npy: float32 in the order z, y, x
+    #[arg(
+        long,
+        value_name = "DENSITY",
+        conflicts_with = "scene",
+        required_unless_present = "scene"
+    )]
+    pub volume: Option<PathBuf>,
+    /// A shipped layer or a .ron file; its rows are those of `probe sky`
+    #[arg(long, value_name = "NAME|FILE")]
+    pub scene: Option<String>,
+    /// Extinction per unit of density, 1/m
+    #[arg(
+        long,
+        value_name = "E",
+        default_value = "1",
+        allow_hyphen_values = true
+    )]
+    pub extinction: f64,
+    /// Scattered share of the extinction
+    #[arg(
+        long,
+        value_name = "A",
+        default_value = "1",
+        allow_hyphen_values = true
+    )]
+    pub albedo: f64,
+    /// Asymmetry of the phase function, one lobe of Henyey and Greenstein
+    #[arg(
+        long,
+        value_name = "G",
+        default_value = "0.85",
+        allow_hyphen_values = true
+    )]
+    pub g: f64,
+    /// Edge of the cube in metres
+    #[arg(
+        long,
+        value_name = "METRES",
+        default_value = "1000",
+        allow_hyphen_values = true
+    )]
+    pub size: f64,
+    /// The rays, .npy or .csv: origin and direction in cube coordinates, direction to the sun
+    #[arg(long, value_name = "ROWS")]
+    pub rays: PathBuf,
+    /// How the light is found
+    #[arg(long, value_enum, default_value = "reference")]
+    pub path: How,
+    /// Which light is counted: scattered once, or any number of times
+    #[arg(long, value_enum, default_value = "all")]
+    pub orders: Which,
+    /// No sun, but a radiance of 1 from all around, which is not counted where the cloud lets it through
+    #[arg(long)]
+    pub furnace: bool,
+    /// Random paths a ray of the reference, 2 to 1e9
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1_000_000_000), default_value = "4096")]
+    pub samples: u32,
+    /// Seed of the random paths
+    #[arg(long, value_name = "S", default_value = "1")]
+    pub seed: u64,
+    /// Where radiance and transmittance go, .npy or .csv
+    #[arg(long, value_name = "LIGHT")]
+    pub out: PathBuf,
+    /// Where the standard errors of the reference's radiance go, .npy or .csv
+    #[arg(long, value_name = "ERRORS")]
+    pub errors: Option<PathBuf>,
 }
 
 /// How rays are followed.
@@ -163,7 +238,184 @@ pub fn run(args: &ProbeArgs) -> Result<(), CliError> {
         What::Sky(args) => sky(args),
         What::Height(args) => height(args),
         What::Terrain(args) => terrain(args),
+        What::Clouds(args) => clouds(args),
     }
+}
+
+fn clouds(args: &CloudsArgs) -> Result<(), CliError> {
+    for path in [Some(&args.out), args.errors.as_ref()]
+        .into_iter()
+        .flatten()
+    {
+        Format::of(path)?;
+        check_folder(path)?;
+    }
+    if args.errors.is_some() && args.path != How::Reference {
+        return Err(CliError::argument(
+            "--errors",
+            "given",
+            "left out for paths other than `reference`, which alone knows its errors",
+        ));
+    }
+    if args.furnace && args.orders == Which::Single {
+        return Err(CliError::argument(
+            "--furnace",
+            "given",
+            "left out for single scattering",
+        ));
+    }
+    let Some(volume) = &args.volume else {
+        return layer(args);
+    };
+    let (shape, density) = read_cube(volume)?;
+    let cube = DensityCube {
+        values: [shape[2], shape[1], shape[0]],
+        density,
+        size: args.size,
+        extinction: args.extinction,
+        albedo: args.albedo,
+        g: args.g,
+    };
+    cube.check()?;
+    let numbers = Table::read(&args.rays, 9)?.to_numbers(&args.rays)?;
+    let rays = numbers
+        .as_chunks::<9>()
+        .0
+        .iter()
+        .enumerate()
+        .map(|(row, numbers)| CubeRay::from_row(row, *numbers))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|e| CliError::Table {
+            path: args.rays.clone(),
+            what: e.to_string(),
+        })?;
+    let (sun, uniform) = if args.furnace { (0.0, 1.0) } else { (1.0, 0.0) };
+    let orders = match args.orders {
+        Which::Single => Orders::Single,
+        Which::All => Orders::All,
+    };
+    let mut light: Vec<u32> = Vec::with_capacity(6 * rays.len());
+    let mut add = |scatter: f32, transmittance: f32| {
+        light.extend([scatter; 3].map(f32::to_bits));
+        light.extend([transmittance; 3].map(f32::to_bits));
+    };
+    let path = match args.path {
+        How::Textbook => ProbePath::Textbook,
+        How::Fast => ProbePath::Fast,
+        How::Reference => {
+            let effort = reference::volume::VolumePaths {
+                samples: args.samples as usize,
+                seed: args.seed,
+                sun,
+                uniform,
+                ..Default::default()
+            };
+            let found = reference::volume::cube_light(&cube, &rays, orders, &effort);
+            for f in &found {
+                add(f[0] as f32, f[2] as f32);
+            }
+            if let Some(path) = &args.errors {
+                let errors: Vec<u32> = found
+                    .iter()
+                    .flat_map(|f| [(f[1] as f32).to_bits(); 3])
+                    .collect();
+                write_results(path, &errors, 3, ResultKind::F32)?;
+            }
+            return write_results(&args.out, &light, 6, ResultKind::F32);
+        }
+    };
+    let options = CubeOptions {
+        path,
+        orders,
+        sun: sun as f32,
+        uniform: uniform as f32,
+    };
+    let gpu = veduta::device::shared()?;
+    for found in cube_light(gpu, veduta::programs(), &cube, &rays, &options)? {
+        add(found.scatter, found.transmittance);
+    }
+    write_results(&args.out, &light, 6, ResultKind::F32)
+}
+
+/// A shipped layer of clouds by its name, or that of a `.ron` file.
+///
+/// # Errors
+/// [`CliError::Read`], [`CliError::Table`] with the file and what is wrong in it, a name that does not exist.
+pub fn deck(name: &str) -> Result<CloudDeck, CliError> {
+    let path = Path::new(name);
+    if path.extension().is_none_or(|e| e != "ron") {
+        return Ok(CloudDeck::named(name)?);
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| CliError::read(path, e))?;
+    CloudDeck::from_ron(&text).map_err(|e| CliError::Table {
+        path: path.to_owned(),
+        what: e.to_string(),
+    })
+}
+
+fn layer(args: &CloudsArgs) -> Result<(), CliError> {
+    if args.furnace {
+        return Err(CliError::argument(
+            "--furnace",
+            "given",
+            "left out for a layer",
+        ));
+    }
+    let deck = deck(args.scene.as_deref().unwrap_or("thesis"))?;
+    let numbers = Table::read(&args.rays, 8)?.to_numbers(&args.rays)?;
+    let rays = numbers
+        .as_chunks::<8>()
+        .0
+        .iter()
+        .enumerate()
+        .map(|(row, numbers)| ProbeRay::from_row(row, *numbers))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|e| CliError::Table {
+            path: args.rays.clone(),
+            what: e.to_string(),
+        })?;
+    let orders = match args.orders {
+        Which::Single => Orders::Single,
+        Which::All => Orders::All,
+    };
+    let mut light: Vec<u32> = Vec::with_capacity(6 * rays.len());
+    let mut errors: Vec<u32> = Vec::new();
+    let mut add = |scatter: f32, transmittance: f32| {
+        light.extend([scatter; 3].map(f32::to_bits));
+        light.extend([transmittance; 3].map(f32::to_bits));
+    };
+    if args.path == How::Reference {
+        let paths = reference::volume::VolumePaths {
+            samples: args.samples as usize,
+            seed: args.seed,
+            ..Default::default()
+        };
+        for f in reference::volume::layer_light(&deck, &rays, orders, &paths) {
+            add(f[0] as f32, f[2] as f32);
+            errors.extend([(f[1] as f32).to_bits(); 3]);
+        }
+        if let Some(path) = &args.errors {
+            write_results(path, &errors, 3, ResultKind::F32)?;
+        }
+        return write_results(&args.out, &light, 6, ResultKind::F32);
+    }
+    if orders == Orders::All {
+        return Err(CliError::argument(
+            "--orders",
+            "all",
+            "`single` for a layer on the device, which has no light of more orders yet",
+        ));
+    }
+    let path = if args.path == How::Fast {
+        ProbePath::Fast
+    } else {
+        ProbePath::Textbook
+    };
+    let gpu = veduta::device::shared()?;
+    for found in layer_light(gpu, veduta::programs(), &deck, &rays, path)? {
+        add(found.scatter, found.transmittance);
+    }
+    write_results(&args.out, &light, 6, ResultKind::F32)
 }
 
 /// A shipped land by its name, or that of a `.ron` file.

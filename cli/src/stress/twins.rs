@@ -58,6 +58,10 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "valleys_see_less_of_the_sky",
     ),
     (
+        "veduta::clouds::tile::march_tile",
+        "a_layer_from_its_tile_meets_the_march",
+    ),
+    (
         "veduta::terrain::clipmap::baked_height",
         "rays_over_baked_heights_meet_the_field",
     ),
@@ -1537,6 +1541,8 @@ pub fn registry() -> Vec<Entry> {
         aerial_slice
     );
     same!(list, "clouds::field", "clouds", clouds, shape_coverage);
+    same!(list, "clouds::integral", "clouds", clouds, step_light);
+    same!(list, "clouds::harmonics", "clouds", clouds, harmonics);
     other!(
         list,
         "clouds::field::cloud_density",

@@ -1,0 +1,28 @@
+//! Clouds: a layer over a host's picture, and the light along given rays as a query.
+
+mod deck;
+mod directions;
+mod layer_rays;
+mod phase;
+mod system;
+mod tile;
+pub mod volume;
+
+pub use deck::CloudDeck;
+pub use layer_rays::layer_light;
+pub use system::{CloudLights, CloudQuality, Clouds, CloudsOptions};
+pub use tile::LOWEST_SUN;
+pub use volume::{CubeLight, CubeOptions, CubeRay, DensityCube, cube_light};
+
+/// Which light of a cloud is counted and how it is found: the same as of the air.
+pub use crate::atmosphere::{Orders, ProbePath};
+
+use crate::error::Error;
+
+fn fault(name: &str, value: impl ToString, domain: &str) -> Error {
+    Error::OutOfDomain {
+        name: name.to_owned(),
+        value: value.to_string(),
+        domain: domain.to_owned(),
+    }
+}

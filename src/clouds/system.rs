@@ -1,0 +1,593 @@
+//! A layer of clouds over a host's picture.
+
+use glam::Vec3;
+
+use super::tile::{Tile, slant};
+use super::{CloudDeck, fault};
+use crate::error::Error;
+use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
+use crate::program::{Pipeline, PipelineOptions, ProgramSet};
+use crate::programs::blocks::CloudDraw as DrawBlock;
+use crate::settings::Preset;
+use crate::view::View;
+
+/// Light that falls on the clouds, in the picture's own unit. A host that has an atmosphere takes it from its `SkyQuery`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CloudLights {
+    /// Irradiance of the sun on a plane across its direction at the clouds' altitude, behind the air; 0 when it has set there.
+    pub sun: Vec3,
+    /// Mean radiance that comes to the clouds from sky and ground; they scatter it without shadows.
+    pub ambient: Vec3,
+}
+
+impl CloudLights {
+    /// Lights of a clear day for a sun of this irradiance.
+    pub fn clear(sun: Vec3) -> CloudLights {
+        CloudLights {
+            sun: sun * Vec3::new(1.0, 0.95, 0.88),
+            ambient: sun * Vec3::new(0.02, 0.028, 0.042),
+        }
+    }
+}
+
+/// How finely a layer is baked and marched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CloudQuality {
+    /// Texels of the tile's edge, a multiple of 64 in [64, 1024].
+    pub texels: u32,
+    /// Texels of the edge of the tile that the first frame is drawn with, a multiple of 64 in [64, 1024].
+    pub first_texels: u32,
+    /// Levels of the tile, in [2, 256].
+    pub levels: u32,
+    /// Steps along a ray, in [1, 4096].
+    pub steps: u32,
+    /// The march ends when less is left, in [0, 0.1].
+    pub min_transmittance: f32,
+    /// Whether a second tile of full size is kept, in which a new one is baked while the other is shown, for a sun that moves; without it the
+    /// first frame's tile takes its turn.
+    pub second_tile: bool,
+    /// Frames that a new tile takes while the first is shown, at least 1.
+    pub frames: u32,
+}
+
+impl CloudQuality {
+    /// That of a preset: `low`, `medium` and the rest.
+    pub fn of(preset: &Preset) -> CloudQuality {
+        let (texels, first_texels, levels, steps) = match preset {
+            Preset::Low => (128, 64, 32, 24),
+            Preset::Medium => (192, 128, 64, 48),
+            _ => (384, 256, 64, 96),
+        };
+        CloudQuality {
+            texels,
+            first_texels,
+            levels,
+            steps,
+            min_transmittance: 1e-3,
+            second_tile: true,
+            frames: 30,
+        }
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] that names the field, its value and what is allowed.
+    pub fn check(&self) -> Result<(), Error> {
+        for (name, texels) in [("texels", self.texels), ("first_texels", self.first_texels)] {
+            if !(64..=1024).contains(&texels) || !texels.is_multiple_of(64) {
+                let domain = "a multiple of 64 in [64, 1024]";
+                return Err(fault(&format!("quality.{name}"), texels, domain));
+            }
+        }
+        for (name, value, low, high) in [
+            ("levels", self.levels, 2, 256),
+            ("steps", self.steps, 1, 4096),
+            ("frames", self.frames, 1, u32::MAX),
+        ] {
+            if !(low..=high).contains(&value) {
+                let domain = format!("in [{low}, {high}]");
+                return Err(fault(&format!("quality.{name}"), value, &domain));
+            }
+        }
+        if !(0.0..=0.1).contains(&self.min_transmittance) {
+            return Err(fault(
+                "quality.min_transmittance",
+                self.min_transmittance,
+                "in [0, 0.1]",
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Choices that are made once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CloudsOptions {
+    /// How finely.
+    pub quality: CloudQuality,
+    /// The layer.
+    pub deck: CloudDeck,
+    /// Distance at which rays end (m), in [100, 1e9].
+    pub far: f64,
+    /// Whether the host's depth buffer hides clouds; [`Clouds::set_host`] tells it.
+    pub over_depth: bool,
+}
+
+impl Default for CloudsOptions {
+    /// The layer of the preset `thesis` with the quality of `high`, to 80 km, without a depth buffer.
+    fn default() -> Self {
+        CloudsOptions {
+            quality: CloudQuality::of(&Preset::High),
+            deck: CloudDeck::default(),
+            far: 80_000.0,
+            over_depth: false,
+        }
+    }
+}
+
+/// Draws a layer of clouds, lit by single scattering, over a host's picture of scene radiance, from below, inside and above.
+///
+/// ```no_run
+/// # fn frame(device: &wgpu::Device, queue: &wgpu::Queue, encoder: &mut wgpu::CommandEncoder, target: &wgpu::TextureView)
+/// # -> Result<(), veduta::Error> {
+/// use veduta::clouds::{CloudLights, Clouds, CloudsOptions};
+/// let targets = veduta::Targets { color_format: wgpu::TextureFormat::Rgba16Float, ..Default::default() };
+/// let mut clouds = Clouds::new(device, veduta::programs(), &targets, &CloudsOptions::default())?;
+/// let view = veduta::View::default();
+/// // Every frame: the tile is baked only when the sun has moved; wind and flight are free.
+/// let work = clouds.prepare(queue, encoder, &view, &CloudLights::clear(view.sun.irradiance))?;
+/// println!("{} tiles begun", work.bakes);
+/// let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+///     color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+///         view: target, depth_slice: None, resolve_target: None,
+///         ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+///     })],
+///     ..Default::default()
+/// });
+/// let _ = clouds.composite(&mut pass)?;
+/// # Ok(()) }
+/// ```
+#[derive(Debug)]
+pub struct Clouds {
+    deck: CloudDeck,
+    quality: CloudQuality,
+    far: f64,
+    depth: Depth,
+    tile: Tile,
+    pipeline: wgpu::RenderPipeline,
+    layouts: Vec<wgpu::BindGroupLayout>,
+    view: wgpu::Buffer,
+    view_group: wgpu::BindGroup,
+    held: Vec<u8>,
+    host: Option<wgpu::TextureView>,
+    over_depth: bool,
+    /// One for each tile.
+    groups: Vec<wgpu::BindGroup>,
+    /// Which tile is shown, and for which sun it was baked; none before the first.
+    shown: Option<(usize, Vec3)>,
+    /// The sun that the other tile is being baked for, and how many parts it has.
+    coming: Option<(Vec3, u32)>,
+    /// The sun of the last frame.
+    last_sun: Option<Vec3>,
+    seen: bool,
+}
+
+impl Clouds {
+    /// Builds pipelines and makes room for tiles.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for targets that do not hold scene radiance, for options; the faults of making pipelines.
+    pub fn new(
+        device: &wgpu::Device,
+        programs: &ProgramSet,
+        targets: &Targets,
+        options: &CloudsOptions,
+    ) -> Result<Clouds, Error> {
+        targets.check()?;
+        options.deck.check()?;
+        options.quality.check()?;
+        if output_of(targets.color_format)? != 2.0 || targets.color_format.components() < 3 {
+            let value = format!("{:?}", targets.color_format);
+            return Err(fault(
+                "targets.color_format",
+                value,
+                "a float format: clouds are laid over scene radiance",
+            ));
+        }
+        if targets.projection == Projection::Orthographic {
+            return Err(fault("targets.projection", "Orthographic", "Perspective"));
+        }
+        if options.over_depth && targets.sample_count != 1 {
+            return Err(fault(
+                "targets.sample_count",
+                targets.sample_count,
+                "1 over a depth buffer",
+            ));
+        }
+        if !(100.0..=1e9).contains(&options.far) {
+            return Err(fault("options.far", options.far, "in [100, 1e9] m"));
+        }
+        let quality = options.quality;
+        let mut texels = vec![quality.first_texels, quality.texels];
+        if quality.second_tile {
+            texels.push(quality.texels);
+        }
+        // What shows nothing has no tile worth its name.
+        let (texels, levels) = if options.deck.is_empty() {
+            (vec![64, 64], 2)
+        } else {
+            (texels, quality.levels)
+        };
+        let tile = Tile::new(device, programs, &texels, levels)?;
+        let features: &[&str] = if options.over_depth {
+            &["CLOUD_OVER_DEPTH"]
+        } else {
+            &[]
+        };
+        let over = wgpu::BlendComponent {
+            src_factor: wgpu::BlendFactor::One,
+            dst_factor: wgpu::BlendFactor::SrcAlpha,
+            operation: wgpu::BlendOperation::Add,
+        };
+        let keep = wgpu::BlendComponent {
+            src_factor: wgpu::BlendFactor::Zero,
+            dst_factor: wgpu::BlendFactor::SrcAlpha,
+            operation: wgpu::BlendOperation::Add,
+        };
+        let ready = programs.get("cloud_layer", features)?.pipeline(
+            device,
+            &PipelineOptions {
+                targets: &[Some(wgpu::ColorTargetState {
+                    format: targets.color_format,
+                    blend: Some(wgpu::BlendState {
+                        color: over,
+                        alpha: keep,
+                    }),
+                    write_mask: wgpu::ColorWrites::ALL,
+                })],
+                depth_stencil: targets
+                    .depth_format
+                    .filter(|_| !options.over_depth)
+                    .map(|format| wgpu::DepthStencilState {
+                        format,
+                        depth_write_enabled: Some(false),
+                        depth_compare: Some(wgpu::CompareFunction::Always),
+                        stencil: Default::default(),
+                        bias: Default::default(),
+                    }),
+                sample_count: targets.sample_count,
+                constants: &[("CLOUD_STEPS", f64::from(quality.steps))],
+                ..Default::default()
+            },
+        )?;
+        let Pipeline::Render(pipeline) = ready.pipeline else {
+            return Err(Error::MissingStage {
+                program: "cloud_layer".to_owned(),
+            });
+        };
+        let view = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("veduta cloud view"),
+            size: DrawBlock::SIZE as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let view_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("veduta cloud view"),
+            layout: &ready.bind_group_layouts[0],
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: view.as_entire_binding(),
+            }],
+        });
+        let mut clouds = Clouds {
+            deck: options.deck.clone(),
+            quality,
+            far: options.far,
+            depth: targets.depth,
+            tile,
+            pipeline,
+            layouts: ready.bind_group_layouts,
+            view,
+            view_group,
+            held: Vec::new(),
+            host: None,
+            over_depth: options.over_depth,
+            groups: Vec::new(),
+            shown: None,
+            coming: None,
+            last_sun: None,
+            seen: true,
+        };
+        if !options.over_depth {
+            clouds.bind(device);
+        }
+        Ok(clouds)
+    }
+
+    fn bind(&mut self, device: &wgpu::Device) {
+        self.groups = self
+            .tile
+            .views
+            .iter()
+            .map(|view| {
+                let mut entries = vec![
+                    wgpu::BindGroupEntry {
+                        binding: 0,
+                        resource: wgpu::BindingResource::Sampler(&self.tile.sampler),
+                    },
+                    wgpu::BindGroupEntry {
+                        binding: 1,
+                        resource: wgpu::BindingResource::TextureView(view),
+                    },
+                ];
+                if let Some(depth) = &self.host {
+                    entries.push(wgpu::BindGroupEntry {
+                        binding: 2,
+                        resource: wgpu::BindingResource::TextureView(depth),
+                    });
+                }
+                device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some("veduta clouds"),
+                    layout: &self.layouts[1],
+                    entries: &entries,
+                })
+            })
+            .collect();
+    }
+
+    /// Tells the host's depth buffer, before which clouds are drawn. Again after each change of size.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for clouds that were made without `over_depth`.
+    pub fn set_host(
+        &mut self,
+        device: &wgpu::Device,
+        depth: &wgpu::TextureView,
+    ) -> Result<(), Error> {
+        if !self.over_depth {
+            return Err(fault(
+                "options.over_depth",
+                false,
+                "true for clouds that are told a depth buffer",
+            ));
+        }
+        self.host = Some(depth.clone());
+        self.bind(device);
+        Ok(())
+    }
+
+    /// The layer.
+    pub fn deck(&self) -> &CloudDeck {
+        &self.deck
+    }
+
+    /// What it keeps on the device.
+    pub fn resources(&self) -> Resources {
+        let parts = self.tile.slots();
+        Resources {
+            pipelines: 2,
+            bind_groups: parts + 2 + self.groups.len() as u32,
+            bindings: parts + 2 + (2 + u32::from(self.over_depth)) * self.groups.len() as u32,
+            buffers: parts + 2,
+            buffer_bytes: self.tile.buffer_bytes() + DrawBlock::SIZE as u64,
+            textures: self.tile.views.len() as u32,
+            texture_bytes: self.tile.texture_bytes(),
+            samplers: 1,
+        }
+    }
+
+    /// Uploads what has changed, and bakes: a small tile at first, then shares of one of full size, and of a new one while the sun moves. Nothing is done for clouds that there
+    /// are not, and for views that cannot show any.
+    ///
+    /// # Errors
+    /// As [`View::check`]; [`Error::OutOfDomain`] for lights and a projection that does not fit the targets.
+    pub fn prepare(
+        &mut self,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        view: &View,
+        lights: &CloudLights,
+    ) -> Result<Work, Error> {
+        view.check()?;
+        for (name, light) in [
+            ("lights.sun", lights.sun),
+            ("lights.ambient", lights.ambient),
+        ] {
+            if !(light.is_finite() && light.min_element() >= 0.0) {
+                return Err(fault(name, light, "finite and at least 0"));
+            }
+        }
+        let [middle, right, up] = view.rays()?;
+        let (scale, offset) = (view.projection.z_axis.z, view.projection.w_axis.z);
+        if self.over_depth && (offset > 0.0) != (self.depth != Depth::Normal) {
+            let value = format!("{:?}", view.projection.to_cols_array());
+            let domain = format!("one with the depth of the targets, {:?}", self.depth);
+            return Err(fault("view.projection", value, &domain));
+        }
+        let eye = view.eye.normalized();
+        self.seen = !self.deck.is_empty() && self.may_show(eye.altitude(), [middle, right, up]);
+        let mut work = Work::default();
+        if !self.seen {
+            return Ok(work);
+        }
+        let to_sun = view.sun.to_light.normalize_or(Vec3::Y);
+        self.bake(queue, encoder, to_sun, &mut work);
+        let sun = self.shown.map_or(to_sun, |s| s.1);
+        let deck = &self.deck;
+        let period = deck.period();
+        let moved = view.eye.moved_by(-glam::DVec3::new(
+            (deck.wind[0] * view.time).rem_euclid(period),
+            0.0,
+            (deck.wind[1] * view.time).rem_euclid(period),
+        ));
+        let place = |axis| -> Result<f32, Error> { Ok(moved.lattice(axis, period)?.frac) };
+        let albedo = deck.albedo as f32;
+        let block = DrawBlock {
+            ray_middle: middle.to_array(),
+            eye_altitude: eye.altitude() as f32,
+            ray_right: right.to_array(),
+            ground_radius: deck.planet_radius as f32,
+            ray_up: up.to_array(),
+            far: self.far as f32,
+            forward: view
+                .world_from_view
+                .transform_vector3(Vec3::NEG_Z)
+                .normalize_or(Vec3::NEG_Z)
+                .to_array(),
+            depth_numerator: offset,
+            to_sun: to_sun.to_array(),
+            depth_offset: scale,
+            sun_light: (albedo * lights.sun).to_array(),
+            min_transmittance: self.quality.min_transmittance,
+            ambient: (albedo * lights.ambient).to_array(),
+            extinction: deck.extinction as f32,
+            place: [place(0)?, place(2)?],
+            shear: slant(sun.to_array()).0,
+            tiles_per_metre: (1.0 / period) as f32,
+            bottom: deck.bottom as f32,
+            thickness: deck.thickness as f32,
+            levels: self.quality.levels as f32,
+            g_forward: deck.g_forward as f32,
+            g_backward: deck.g_backward as f32,
+            backward_share: deck.backward_share as f32,
+            sky_depth: if self.depth == Depth::Normal {
+                1.0
+            } else {
+                0.0
+            },
+        };
+        let bytes = block.to_bytes().to_vec();
+        if bytes != self.held {
+            queue.write_buffer(&self.view, 0, &bytes);
+            work.writes += 1;
+            work.bytes += bytes.len() as u64;
+            self.held = bytes;
+        }
+        Ok(work)
+    }
+
+    /// Brings the tiles up to a sun.
+    fn bake(
+        &mut self,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        to_sun: Vec3,
+        work: &mut Work,
+    ) {
+        let step = self.last_sun.map_or(Vec3::ZERO, |last| to_sun - last);
+        self.last_sun = Some(to_sun);
+        // A sun that jumps by more than ten degrees is begun anew.
+        self.shown = self.shown.filter(|s| (to_sun - s.1).length() < 0.17);
+        if self.shown.is_none() {
+            self.coming = None;
+        }
+        let Some((shown, baked_for)) = self.shown else {
+            for part in 0..self.tile.parts(0) {
+                add(
+                    work,
+                    self.tile
+                        .bake(queue, encoder, &self.deck, to_sun.to_array(), 0, part),
+                );
+            }
+            work.bakes += 1;
+            self.shown = Some((0, to_sun));
+            return;
+        };
+        let other = match (shown, self.tile.views.len()) {
+            (1, 3) => 2,
+            (1, _) => 0,
+            _ => 1,
+        };
+        if self.coming.is_none() {
+            // A sun within a tenth of a minute of arc is the same.
+            if shown > 0 && (to_sun - baked_for).length() < 3e-5 {
+                return;
+            }
+            // The new tile is shown for as long as the one after it takes: it is baked for the middle of that time.
+            let share = self.share(other);
+            let taken = self.tile.parts(other).div_ceil(share);
+            let ahead = to_sun + step * (1.5 * taken as f32);
+            let ahead = if step.length() < 0.02 { ahead } else { to_sun };
+            self.coming = Some((ahead.normalize_or(to_sun), 0));
+            work.bakes += 1;
+        }
+        let share = self.share(other);
+        let parts = self.tile.parts(other);
+        if let Some((sun, done)) = &mut self.coming {
+            for part in *done..(*done + share).min(parts) {
+                add(
+                    work,
+                    self.tile
+                        .bake(queue, encoder, &self.deck, sun.to_array(), other, part),
+                );
+            }
+            *done += share;
+            if *done >= parts {
+                self.shown = Some((other, *sun));
+                self.coming = None;
+            }
+        }
+    }
+
+    /// Parts of a tile that a frame bakes.
+    fn share(&self, tile: usize) -> u32 {
+        self.tile.parts(tile).div_ceil(self.quality.frames).max(1)
+    }
+
+    /// Whether a ray of the picture can meet the layer.
+    fn may_show(&self, altitude: f64, [middle, right, up]: [Vec3; 3]) -> bool {
+        let axis = middle.normalize_or(Vec3::NEG_Z);
+        let cosine = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]
+            .iter()
+            .map(|[x, y]| (middle + *x * right + *y * up).normalize_or(axis).dot(axis))
+            .fold(1.0, f32::min);
+        let wide = f64::from(cosine.clamp(-1.0, 1.0)).acos() + 1e-4;
+        let pitch = f64::from(axis.y.clamp(-1.0, 1.0)).asin();
+        let radius = self.deck.planet_radius;
+        let top = self.deck.bottom + self.deck.thickness;
+        // How far below level a sphere's edge is seen.
+        let dip = |level: f64| ((radius + level) / (radius + altitude.max(level))).acos();
+        if altitude > top {
+            pitch - wide <= -dip(top)
+        } else if altitude < self.deck.bottom {
+            // Below the horizon there is ground.
+            pitch + wide >= -dip(0.0_f64.min(altitude))
+        } else {
+            true
+        }
+    }
+
+    /// Lays the clouds over what the pass holds: radiance times transmittance, plus light. Clouds over a depth buffer must be drawn in a pass that does not
+    /// write it.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] when a depth buffer is needed and [`Clouds::set_host`] has told none.
+    pub fn composite(&self, pass: &mut wgpu::RenderPass<'_>) -> Result<Work, Error> {
+        if !self.seen {
+            return Ok(Work::default());
+        }
+        let shown = self.shown.map_or(0, |s| s.0);
+        let Some(group) = self.groups.get(shown) else {
+            return Err(fault(
+                "host",
+                "none",
+                "a depth buffer, told with `set_host`",
+            ));
+        };
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.view_group, &[]);
+        pass.set_bind_group(1, group, &[]);
+        pass.draw(0..3, 0..1);
+        Ok(Work {
+            draws: 1,
+            ..Work::default()
+        })
+    }
+}
+
+fn add(work: &mut Work, more: Work) {
+    work.dispatches += more.dispatches;
+    work.writes += more.writes;
+    work.bytes += more.bytes;
+}

@@ -1,0 +1,559 @@
+//! Light in cubes of any density, and layers from their tiles, against quadrature, paths and exact solutions.
+
+use crate::common::gpu;
+use veduta::atmosphere::ProbeRay;
+use veduta::clouds::{
+    CloudDeck, CloudLights, CloudQuality, Clouds, CloudsOptions, CubeOptions, CubeRay, DensityCube,
+    Orders, ProbePath, cube_light, layer_light,
+};
+use veduta::glam::{DVec3, Vec3};
+use veduta::reference::monte_carlo::Random;
+use veduta::reference::phase::phase_henyey_greenstein;
+use veduta::reference::volume::{self, VolumePaths};
+use veduta::view::direction;
+use veduta::{Preset, Targets, View, WorldPos, wgpu};
+
+fn uniform(extinction: f64, albedo: f64, g: f64) -> DensityCube {
+    DensityCube {
+        values: [3, 1, 2],
+        density: vec![1.0; 6],
+        size: 500.0,
+        extinction,
+        albedo,
+        g,
+    }
+}
+
+/// A round heap of random density.
+fn heap(n: usize, extinction: f64) -> DensityCube {
+    let mut random = Random::new(3, 1);
+    let coarse: Vec<f64> = (0..512).map(|_| random.unit()).collect();
+    let mut density = Vec::new();
+    for z in 0..n {
+        for y in 0..n {
+            for x in 0..n {
+                let p = [x, y, z].map(|c| (c as f64 + 0.5) / n as f64);
+                let away = p.iter().map(|c| (c - 0.5) * (c - 0.5)).sum::<f64>().sqrt();
+                let [i, j, k] = p.map(|c| (c * 8.0) as usize);
+                let noise = coarse[(k * 8 + j) * 8 + i];
+                density.push((2.0 * (0.42 - away) / 0.3 + noise - 0.5).clamp(0.0, 1.0) as f32);
+            }
+        }
+    }
+    DensityCube {
+        values: [n; 3],
+        density,
+        size: 1000.0,
+        extinction,
+        albedo: 1.0,
+        g: 0.85,
+    }
+}
+
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    DVec3::from(v).normalize().to_array()
+}
+
+/// A picture of `n` x `n` rays from before the cube.
+fn image(n: usize, to_sun: [f64; 3]) -> Vec<CubeRay> {
+    let mut rays = Vec::new();
+    for j in 0..n {
+        for i in 0..n {
+            let at = |k: usize| (k as f64 + 0.5) / n as f64 - 0.5;
+            rays.push(CubeRay {
+                origin: [0.5, 0.5, -1.5],
+                dir: unit([0.9 * at(i), 0.9 * at(j), 1.5]),
+                to_sun: unit(to_sun),
+            });
+        }
+    }
+    rays
+}
+
+fn options(path: ProbePath, orders: Orders) -> CubeOptions {
+    CubeOptions {
+        path,
+        orders,
+        ..Default::default()
+    }
+}
+
+#[test]
+fn a_uniform_cube_scatters_once_as_the_formula_says() {
+    let dir = [1.0, 0.0, 0.0];
+    for (extinction, g) in [(1e-5, 0.0), (0.002, 0.85), (0.02, -0.5), (0.2, 0.6)] {
+        let cube = uniform(extinction, 0.9, g);
+        let depth = extinction * cube.size;
+        let cases = [
+            ([1.0, 0.0, 0.0], depth * (-depth).exp(), 1.0),
+            ([-1.0, 0.0, 0.0], -0.5 * (-2.0 * depth).exp_m1(), -1.0),
+        ];
+        for (to_sun, light, mu) in cases {
+            let ray = CubeRay {
+                origin: [-3.0, 0.4, 0.7],
+                dir,
+                to_sun,
+            };
+            let wanted = 0.9 * phase_henyey_greenstein(mu, g) * light;
+            let truth =
+                volume::cube_light(&cube, &[ray], Orders::Single, &VolumePaths::default())[0];
+            assert!(
+                (truth[0] - wanted).abs() <= 1e-6 * wanted + 1e-15,
+                "{truth:?} {wanted}"
+            );
+            assert!((truth[2] - (-depth).exp()).abs() < 1e-7);
+            for path in [ProbePath::Textbook, ProbePath::Fast] {
+                let options = options(path, Orders::Single);
+                let found =
+                    cube_light(gpu(), veduta::programs(), &cube, &[ray], &options).unwrap()[0];
+                let off = (f64::from(found.scatter) - wanted).abs();
+                assert!(
+                    off <= 2e-3 * wanted + 1e-9,
+                    "{path:?} {depth} {found:?} {wanted}"
+                );
+                assert!((f64::from(found.transmittance) - (-depth).exp()).abs() < 1e-4);
+            }
+        }
+    }
+}
+
+#[test]
+fn rays_that_miss_a_cube_are_clear() {
+    let cube = uniform(0.1, 1.0, 0.5);
+    let ray = |origin, dir| CubeRay {
+        origin,
+        dir,
+        to_sun: [0.0, 1.0, 0.0],
+    };
+    let rays = [
+        ray([-1.0, 1.5, 0.5], [1.0, 0.0, 0.0]),
+        ray([2.0, 0.5, 0.5], [1.0, 0.0, 0.0]),
+        ray([0.5, 0.5, 0.5], [0.0, 0.0, 1.0]),
+    ];
+    for orders in [Orders::Single, Orders::All] {
+        for path in [ProbePath::Textbook, ProbePath::Fast] {
+            let found = cube_light(
+                gpu(),
+                veduta::programs(),
+                &cube,
+                &rays,
+                &options(path, orders),
+            )
+            .unwrap();
+            for clear in &found[..2] {
+                assert_eq!((clear.scatter, clear.transmittance), (0.0, 1.0));
+            }
+            assert!(found[2].scatter > 0.0 && found[2].transmittance < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn marches_through_a_heap_meet_quadrature() {
+    for (extinction, textbook, fast) in [(0.005, 1e-2, 3e-2), (0.05, 1e-2, 5e-2)] {
+        let cube = heap(24, extinction);
+        let rays = image(5, [0.6, 0.5, -0.2]);
+        let truth = volume::cube_light(&cube, &rays, Orders::Single, &VolumePaths::default());
+        let size = truth.iter().map(|t| t[0] * t[0]).sum::<f64>();
+        for (path, bound) in [(ProbePath::Textbook, textbook), (ProbePath::Fast, fast)] {
+            let options = options(path, Orders::Single);
+            let found = cube_light(gpu(), veduta::programs(), &cube, &rays, &options).unwrap();
+            let off: f64 = found
+                .iter()
+                .zip(&truth)
+                .map(|(f, t)| (f64::from(f.scatter) - t[0]).powi(2))
+                .sum();
+            let relative = (off / size).sqrt();
+            println!("{path:?} at {extinction}: {relative:.5}");
+            assert!(relative < bound, "{path:?} {extinction}: {relative}");
+        }
+    }
+}
+
+#[test]
+fn light_of_all_orders_meets_paths() {
+    for (name, extinction, to_sun) in [
+        ("thin, back lit", 0.006, [0.2, 0.3, 1.0]),
+        ("thick, front lit", 0.06, [0.3, 0.5, -1.0]),
+        ("thick, low sun", 0.06, [1.0, 0.06, 0.4]),
+    ] {
+        let cube = heap(24, extinction);
+        let n = 16;
+        let rays = image(n, to_sun);
+        let paths = VolumePaths {
+            samples: 96,
+            ..Default::default()
+        };
+        let truth = volume::cube_light(&cube, &rays, Orders::All, &paths);
+        let options = options(ProbePath::Fast, Orders::Single);
+        let once = cube_light(gpu(), veduta::programs(), &cube, &rays, &options).unwrap();
+        let found = cube_light(
+            gpu(),
+            veduta::programs(),
+            &cube,
+            &rays,
+            &CubeOptions::default(),
+        )
+        .unwrap();
+        let mean = |f: &dyn Fn(usize) -> f64| (0..n * n).map(f).sum::<f64>();
+        let (light, wanted) = (
+            mean(&|i| f64::from(found[i].scatter)),
+            mean(&|i| truth[i][0]),
+        );
+        // Means of squares of 8 x 8 rays.
+        let (mut off, mut size) = (0.0, 0.0);
+        for block in 0..4 {
+            let rays = (0..n * n).filter(|i| (i / n / 8) * 2 + (i % n) / 8 == block);
+            let (a, b) = rays.fold((0.0, 0.0), |(a, b), i| {
+                (a + f64::from(found[i].scatter), b + truth[i][0])
+            });
+            off += (a - b) * (a - b);
+            size += b * b;
+        }
+        let (ratio, blocks) = (light / wanted, (off / size).sqrt());
+        println!(
+            "{name}: mean {ratio:.4}, blocks {blocks:.4}, once {:.3}",
+            mean(&|i| f64::from(once[i].scatter)) / wanted
+        );
+        assert!((ratio - 1.0).abs() < 0.1, "{name}: {ratio}");
+        assert!(blocks < 0.2, "{name}: {blocks}");
+        // A test that single scattering would pass would be none.
+        assert!((mean(&|i| f64::from(once[i].scatter)) / wanted - 1.0).abs() > 0.3);
+    }
+}
+
+#[test]
+fn a_white_furnace_stays_white() {
+    for (extinction, g) in [(0.006, 0.85), (0.06, 0.0), (0.6, 0.85)] {
+        let mut cube = heap(16, extinction);
+        cube.g = g;
+        let rays = image(12, [0.0, 1.0, 0.0]);
+        let furnace = CubeOptions {
+            sun: 0.0,
+            uniform: 1.0,
+            ..Default::default()
+        };
+        for f in cube_light(gpu(), veduta::programs(), &cube, &rays, &furnace).unwrap() {
+            let light = f.scatter + f.transmittance;
+            assert!(
+                (0.999..=1.001).contains(&light),
+                "{extinction} {g}: {light}"
+            );
+        }
+        // With absorption it darkens.
+        cube.albedo = 0.9;
+        let dark = cube_light(gpu(), veduta::programs(), &cube, &rays, &furnace).unwrap();
+        let middle = dark[6 * 12 + 6];
+        assert!(middle.scatter + middle.transmittance < 0.95);
+    }
+}
+
+#[test]
+fn light_in_extreme_cubes_is_finite() {
+    let mut rays = image(4, [0.3, 0.0, -1.0]);
+    rays.extend(image(4, [0.0, -1.0, 0.0]));
+    rays[0].dir = [0.0, 0.0, 1.0];
+    rays[0].origin = [0.0, 1.0, -1e6];
+    for extinction in [0.0, 1e-2, 1e6] {
+        for (albedo, g) in [(1.0, 0.99), (0.5, -0.99)] {
+            let cube = DensityCube {
+                albedo,
+                g,
+                ..heap(8, extinction)
+            };
+            for (path, orders) in [
+                (ProbePath::Textbook, Orders::Single),
+                (ProbePath::Fast, Orders::All),
+            ] {
+                let options = options(path, orders);
+                for f in cube_light(gpu(), veduta::programs(), &cube, &rays, &options).unwrap() {
+                    let good = f.scatter.is_finite()
+                        && f.scatter >= -1e-3
+                        && (0.0..=1.0).contains(&f.transmittance);
+                    assert!(good, "{extinction} {albedo} {g} {path:?}: {f:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn faults_of_cubes_are_named() {
+    let good = uniform(0.1, 1.0, 0.5);
+    let change = |f: &dyn Fn(&mut DensityCube)| {
+        let mut cube = good.clone();
+        f(&mut cube);
+        cube.check().unwrap_err().to_string()
+    };
+    assert!(good.check().is_ok());
+    for (fault, name) in [
+        (change(&|c| c.density[3] = f32::NAN), "cube.density"),
+        (change(&|c| c.density[3] = -1.0), "cube.density"),
+        (change(&|c| c.values = [6, 2, 1]), "cube.density"),
+        (change(&|c| c.values = [0, 2, 1]), "cube.values"),
+        (change(&|c| c.size = 0.0), "cube.size"),
+        (change(&|c| c.extinction = f64::NAN), "cube.extinction"),
+        (change(&|c| c.albedo = 1.01), "cube.albedo"),
+        (change(&|c| c.g = 1.0), "cube.g"),
+    ] {
+        assert!(fault.contains(name), "{fault}");
+    }
+    assert!(
+        CubeRay::from_row(4, [0.0; 9])
+            .unwrap_err()
+            .to_string()
+            .contains("row 4")
+    );
+    let both = CubeOptions {
+        uniform: 1.0,
+        orders: Orders::Single,
+        ..Default::default()
+    };
+    assert!(cube_light(gpu(), veduta::programs(), &good, &[], &both).is_err());
+}
+
+fn layer_rays(to_sun: [f64; 3]) -> Vec<ProbeRay> {
+    let mut random = Random::new(8, 2);
+    let mut rays = Vec::new();
+    for altitude in [2.0, 4700.0, 9000.0] {
+        for _ in 0..16 {
+            let lift = 0.08 + 0.5 * random.unit();
+            let dir = direction(
+                if altitude > 6000.0 { -lift } else { lift },
+                6.3 * random.unit(),
+            );
+            rays.push(ProbeRay {
+                altitude,
+                dir: dir.to_array(),
+                to_sun,
+                distance: f64::INFINITY,
+            });
+        }
+    }
+    rays
+}
+
+#[test]
+fn a_layer_from_its_tile_meets_the_march() {
+    for deck in ["thesis", "stratus"] {
+        let deck = CloudDeck::named(deck).unwrap();
+        let rays = layer_rays(direction(0.6, 0.4).to_array());
+        let truth = volume::layer_light(&deck, &rays, Orders::Single, &VolumePaths::default());
+        let size = truth.iter().map(|t| t[0] * t[0]).sum::<f64>();
+        for (path, bound) in [(ProbePath::Textbook, 0.02), (ProbePath::Fast, 0.06)] {
+            let found = layer_light(gpu(), veduta::programs(), &deck, &rays, path).unwrap();
+            let off: f64 = (0..rays.len())
+                .map(|i| (f64::from(found[i].scatter) - truth[i][0]).powi(2))
+                .sum();
+            let relative = (off / size).sqrt();
+            let through = (0..rays.len())
+                .map(|i| (f64::from(found[i].transmittance) - truth[i][2]).abs())
+                .fold(0.0, f64::max);
+            println!("{path:?}: {relative:.4}, transmittance {through:.4}");
+            assert!(relative < bound, "{path:?} {relative}");
+            assert!(through < 0.05, "{path:?} {through}");
+        }
+    }
+}
+
+struct Host {
+    texture: wgpu::Texture,
+}
+
+impl Host {
+    const WIDTH: u32 = 64;
+    const HEIGHT: u32 = 36;
+
+    fn new() -> Host {
+        let texture = gpu().device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d {
+                width: Self::WIDTH,
+                height: Self::HEIGHT,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba16Float,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        Host { texture }
+    }
+
+    fn targets() -> Targets {
+        Targets {
+            color_format: wgpu::TextureFormat::Rgba16Float,
+            ..Default::default()
+        }
+    }
+
+    /// Work of a frame over black, and the 16-bit words of the picture.
+    fn frame(&self, clouds: &mut Clouds, view: &View) -> (veduta::Work, veduta::Work, Vec<u16>) {
+        let gpu = gpu();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let lights = CloudLights::clear(view.sun.irradiance);
+        let prepared = clouds
+            .prepare(&gpu.queue, &mut encoder, view, &lights)
+            .unwrap();
+        let target = self.texture.create_view(&Default::default());
+        let drawn = {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &target,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                ..Default::default()
+            });
+            clouds.composite(&mut pass).unwrap()
+        };
+        gpu.queue.submit([encoder.finish()]);
+        let bytes = gpu.read_texture(&self.texture).unwrap();
+        let words = bytes
+            .chunks_exact(2)
+            .map(|b| u16::from_le_bytes([b[0], b[1]]))
+            .collect();
+        (prepared, drawn, words)
+    }
+}
+
+fn small() -> CloudsOptions {
+    CloudsOptions {
+        quality: CloudQuality {
+            texels: 64,
+            first_texels: 64,
+            levels: 16,
+            steps: 16,
+            frames: 2,
+            ..CloudQuality::of(&Preset::Low)
+        },
+        ..Default::default()
+    }
+}
+
+fn looking(altitude: f64, pitch: f64) -> View {
+    let mut view = View {
+        eye: WorldPos::from_metres(DVec3::new(100.0, altitude, -300.0)),
+        ..Default::default()
+    };
+    view.look(0.4, pitch, 0.8, 16.0 / 9.0);
+    view
+}
+
+#[test]
+fn clouds_that_cannot_be_seen_are_no_work() {
+    let host = Host::new();
+    let new = |options: &CloudsOptions| {
+        Clouds::new(&gpu().device, veduta::programs(), &Host::targets(), options).unwrap()
+    };
+    let idle = veduta::Work::default();
+    for change in [
+        |d: &mut CloudDeck| d.coverage = 0.0,
+        |d: &mut CloudDeck| d.thickness = 0.0,
+        |d: &mut CloudDeck| d.extinction = 0.0,
+    ] {
+        let mut options = small();
+        change(&mut options.deck);
+        let (prepared, drawn, words) = host.frame(&mut new(&options), &looking(300.0, 0.4));
+        assert_eq!((prepared, drawn), (idle, idle));
+        assert!(words.chunks(4).all(|p| p == [0, 0, 0, 0x3c00]));
+    }
+    let mut clouds = new(&small());
+    for view in [looking(300.0, -1.2), looking(20_000.0, 0.8)] {
+        let (prepared, drawn, _) = host.frame(&mut clouds, &view);
+        assert_eq!((prepared, drawn), (idle, idle));
+    }
+    // Seen: the small tile at once, the large one in the next frames, then nothing but the draw.
+    let mut view = looking(300.0, 0.4);
+    let (prepared, drawn, words) = host.frame(&mut clouds, &view);
+    assert_eq!((prepared.bakes, drawn.draws), (1, 1));
+    assert!(words.chunks(4).any(|p| p[0] > 0 && p[3] < 0x3c00));
+    let later: Vec<u32> = (0..4)
+        .map(|_| host.frame(&mut clouds, &view).0.dispatches)
+        .collect();
+    assert_eq!(later, [4, 4, 0, 0]);
+    // Wind and flight need no bake.
+    view.time = 100.0;
+    view.eye = view.eye.moved_by(DVec3::new(5000.0, 10.0, -77.0));
+    let (prepared, ..) = host.frame(&mut clouds, &view);
+    assert_eq!((prepared.dispatches, prepared.writes), (0, 1));
+    // A sun that moves does, a part a frame.
+    view.sun.to_light = direction(0.53, 1.5).as_vec3();
+    view.sun.to_light = (view.sun.to_light * 0.0 + Vec3::new(0.866, 0.505, 0.0)).normalize();
+    let (prepared, ..) = host.frame(&mut clouds, &view);
+    assert_eq!((prepared.bakes, prepared.dispatches), (1, 4));
+}
+
+#[test]
+fn pictures_of_clouds_are_finite_everywhere() {
+    let host = Host::new();
+    let finite = |w: &u16| w & 0x7c00 != 0x7c00;
+    for extinction in [1e-6, 0.06, 1e6] {
+        for (coverage, thickness) in [(1.0, 1500.0), (0.5, 1e-3), (0.01, 1e5)] {
+            let mut options = small();
+            options.deck.extinction = extinction;
+            options.deck.coverage = coverage;
+            options.deck.thickness = thickness;
+            let mut clouds = Clouds::new(
+                &gpu().device,
+                veduta::programs(),
+                &Host::targets(),
+                &options,
+            )
+            .unwrap();
+            let next = |x: f32, up: bool| f64::from(if up { x.next_up() } else { x.next_down() });
+            let top = (4000.0 + thickness) as f32;
+            for altitude in [
+                0.0,
+                next(4000.0, false),
+                4000.0,
+                next(4000.0, true),
+                next(top, false),
+                f64::from(top),
+                next(top, true),
+                4e5,
+            ] {
+                for sun in [-0.2, -0.0, 0.0, 0.1, 1.57] {
+                    let mut view = looking(altitude, if altitude > 5000.0 { -0.3 } else { 0.1 });
+                    view.sun.to_light = direction(sun, 1.0).as_vec3().normalize();
+                    let (_, _, words) = host.frame(&mut clouds, &view);
+                    let bad = words.iter().filter(|w| !finite(w)).count();
+                    assert_eq!(
+                        bad, 0,
+                        "{extinction} {coverage} {thickness} {altitude} {sun}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn presets_of_clouds_keep_to_their_memory() {
+    for (preset, most) in [
+        (Preset::Low, 12.0),
+        (Preset::Medium, 32.0),
+        (Preset::High, 96.0),
+    ] {
+        let options = CloudsOptions {
+            quality: CloudQuality::of(&preset),
+            ..Default::default()
+        };
+        let clouds = Clouds::new(
+            &gpu().device,
+            veduta::programs(),
+            &Host::targets(),
+            &options,
+        )
+        .unwrap();
+        let held = clouds.resources();
+        let mib = (held.texture_bytes + held.buffer_bytes) as f64 / f64::from(1 << 20);
+        assert!(mib <= most, "{preset:?} {mib}");
+    }
+}

@@ -1,0 +1,93 @@
+A cloud layer over a host's picture, from its tile: radiance, and transmittance in alpha.
+
+#PROGRAM{ cloud_layer }#
+
+#DEFINE{
+    #VARYING{
+struct Corner {
+    @builtin(position) position: vec4<f32>,
+    @location(0) ray: vec3<f32>,
+}
+
+struct CloudDraw {
+    ray_middle: vec3<f32>,
+    eye_altitude: f32,
+    ray_right: vec3<f32>,
+    ground_radius: f32,
+    ray_up: vec3<f32>,
+    // The march ends here [m].
+    far: f32,
+    forward: vec3<f32>,
+    // Depth is depth_numerator / linear depth - depth_offset.
+    depth_numerator: f32,
+    to_sun: vec3<f32>,
+    depth_offset: f32,
+    // Irradiance of the sun at the clouds, times the albedo.
+    sun_light: vec3<f32>,
+    min_transmittance: f32,
+    // Radiance from around that the clouds scatter [1/sr], times the albedo.
+    ambient: vec3<f32>,
+    extinction: f32,
+    place: vec2<f32>,
+    shear: vec2<f32>,
+    tiles_per_metre: f32,
+    bottom: f32,
+    thickness: f32,
+    levels: f32,
+    g_forward: f32,
+    g_backward: f32,
+    backward_share: f32,
+    // Depth where there is nothing before the sky.
+    sky_depth: f32,
+}
+
+@group(0) @binding(0) var<uniform> draw_view: CloudDraw;
+    }#
+}#
+
+#VERTEX{
+    #USE{ VARYING }#
+    #CODE{
+@vertex
+fn cover(@builtin(vertex_index) index: u32) -> Corner {
+    let clip = vec2<f32>(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u));
+    return Corner(vec4<f32>(clip, 0.0, 1.0), draw_view.ray_middle + clip.x * draw_view.ray_right + clip.y * draw_view.ray_up);
+}
+    }#
+}#
+
+#FRAGMENT{
+    #CODE{
+#import veduta::clouds::tile::{CloudTile, march_tile}
+#import veduta::lighting::phase::{phase_double_henyey_greenstein}
+#import veduta::planet::shell::{ground_distance}
+    }#
+    #USE{ VARYING }#
+    #CODE{
+@group(1) @binding(0) var linear: sampler;
+@group(1) @binding(1) var tile: texture_3d<f32>;
+#ifdef CLOUD_OVER_DEPTH
+@group(1) @binding(2) var host_depth: texture_depth_2d;
+#endif
+
+override CLOUD_STEPS: i32 = 64;
+
+@fragment
+fn draw(in: Corner) -> @location(0) vec4<f32> {
+    let dir = normalize(in.ray);
+    let altitude = max(draw_view.eye_altitude, 0.0);
+    let ground = ground_distance(draw_view.ground_radius, altitude, dir.y);
+    var far = select(draw_view.far, min(draw_view.far, ground), ground >= 0.0);
+#ifdef CLOUD_OVER_DEPTH
+    let depth = textureLoad(host_depth, vec2<i32>(in.position.xy), 0);
+    let linear_depth = draw_view.depth_numerator / (depth + draw_view.depth_offset);
+    let reached = linear_depth / max(dot(dir, draw_view.forward), 1e-4);
+    far = select(min(far, max(reached, 0.0)), far, depth == draw_view.sky_depth || reached > 1e8);
+#endif
+    let layer = CloudTile(draw_view.place, draw_view.shear, draw_view.tiles_per_metre, draw_view.bottom, draw_view.thickness, draw_view.levels, draw_view.extinction);
+    let light = march_tile(tile, linear, layer, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS);
+    let phase = phase_double_henyey_greenstein(dot(dir, draw_view.to_sun), draw_view.g_forward, draw_view.g_backward, draw_view.backward_share);
+    return vec4<f32>(light.scatter * phase * draw_view.sun_light + (1.0 - light.transmittance) * draw_view.ambient, light.transmittance);
+}
+    }#
+}#

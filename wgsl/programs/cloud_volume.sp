@@ -1,0 +1,393 @@
+Light in a cube of any density, a query: depths towards the sun, light of all orders by sweeps of discrete directions over cells, and the
+march along rays. Everything lies in storage buffers, so that densities keep their 32 bits. One invocation a node, a cell, a ray; the sweep has a
+workgroup a direction, which goes from plane to plane.
+
+The phase function is split in two: a part of four degrees that turns light, of which the cells hold all orders, and the peak that hardly does, whose
+orders a table of depth and angle holds.
+
+#PROGRAM{ cloud_volume }#
+
+#COMPUTE{
+    #CODE{
+#import veduta::clouds::harmonics::{Harmonics, harmonics}
+#import veduta::clouds::integral::{step_light}
+#import veduta::lighting::phase::{phase_henyey_greenstein}
+#import veduta::math::series::{one_minus_exp, one_minus_exp_over_x}
+
+struct CloudGrid {
+    // Cells of the light of many orders.
+    cells: vec3<i32>,
+    // Edge of the cube [m].
+    size: f32,
+    // Values of the density.
+    voxels: vec3<i32>,
+    // Extinction at a density of 1 [1/m].
+    extinction: f32,
+    // Nodes of the depth towards the sun, on each axis.
+    nodes: i32,
+    albedo: f32,
+    g: f32,
+    // Share of the peak in the phase function.
+    peak: f32,
+    to_sun: vec3<f32>,
+    // Irradiance of the sun; 0 for the last gathering, which leaves its own light out.
+    sun: f32,
+    // Albedo times moment of the degrees 0 to 3 of the phase function without its peak.
+    degrees: vec4<f32>,
+    // Radiance that comes from every free direction.
+    uniform_light: f32,
+    // Largest step along a ray over the edge of the cube, and of its march to the sun.
+    step: f32,
+    // Largest depth of a step, while it is longer than a thirtieth of the largest.
+    step_depth: f32,
+    // Whether light of all orders is asked for.
+    all_orders: i32,
+    count: i32,
+    coarse: vec3<i32>,
+}
+
+@group(0) @binding(0) var<uniform> grid: CloudGrid;
+
+@group(1) @binding(0) var<storage, read> density: array<f32>;
+
+fn voxel(at: vec3<i32>) -> f32 {
+    let k = clamp(at, vec3<i32>(0), grid.voxels - 1);
+    return density[(k.z * grid.voxels.y + k.y) * grid.voxels.x + k.x];
+}
+
+// Density at a point of the unit cube, linear between the centres of voxels.
+fn density_at(point: vec3<f32>) -> f32 {
+    let q = point * vec3<f32>(grid.voxels) - 0.5;
+    let base = floor(q);
+    let f = q - base;
+    let k = vec3<i32>(base);
+    let near = mix(mix(voxel(k), voxel(k + vec3<i32>(1, 0, 0)), f.x), mix(voxel(k + vec3<i32>(0, 1, 0)), voxel(k + vec3<i32>(1, 1, 0)), f.x), f.y);
+    let far = mix(mix(voxel(k + vec3<i32>(0, 0, 1)), voxel(k + vec3<i32>(1, 0, 1)), f.x), mix(voxel(k + vec3<i32>(0, 1, 1)), voxel(k + vec3<i32>(1, 1, 1)), f.x), f.y);
+    return mix(near, far, f.z);
+}
+
+// Distances at which a ray enters and leaves the unit cube; the second is below the first where it misses.
+fn cube_span(origin: vec3<f32>, dir: vec3<f32>) -> vec2<f32> {
+    let d = select(dir, vec3<f32>(1e-9), abs(dir) < vec3<f32>(1e-9));
+    let a = -origin / d;
+    let b = (1.0 - origin) / d;
+    let low = min(a, b);
+    let high = max(a, b);
+    return vec2<f32>(max(max(low.x, low.y), low.z), min(min(high.x, high.y), high.z));
+}
+
+fn marched_depth(point: vec3<f32>) -> f32 {
+    let far = max(cube_span(point, grid.to_sun).y, 0.0);
+    let count = clamp(i32(ceil(far / grid.step)), 1, 150);
+    let ds = far / f32(count);
+    var sum = 0.0;
+    for (var i = 0; i < count; i++) {
+        sum += density_at(point + grid.to_sun * ((f32(i) + 0.5) * ds));
+    }
+    return sum * ds * grid.size * grid.extinction;
+}
+
+@group(1) @binding(1) var<storage, read> nodes: array<f32>;
+
+fn node(at: vec3<i32>) -> f32 {
+    return nodes[(at.z * grid.nodes + at.y) * grid.nodes + at.x];
+}
+
+fn baked_depth(point: vec3<f32>) -> f32 {
+    let q = clamp(point, vec3<f32>(0.0), vec3<f32>(1.0)) * f32(grid.nodes - 1);
+    let base = min(floor(q), vec3<f32>(f32(grid.nodes - 2)));
+    let f = q - base;
+    let k = vec3<i32>(base);
+    let near = mix(mix(node(k), node(k + vec3<i32>(1, 0, 0)), f.x), mix(node(k + vec3<i32>(0, 1, 0)), node(k + vec3<i32>(1, 1, 0)), f.x), f.y);
+    let far = mix(mix(node(k + vec3<i32>(0, 0, 1)), node(k + vec3<i32>(1, 0, 1)), f.x), mix(node(k + vec3<i32>(0, 1, 1)), node(k + vec3<i32>(1, 1, 1)), f.x), f.y);
+    return mix(near, far, f.z);
+}
+
+@group(2) @binding(0) var<storage, read_write> depths: array<f32>;
+
+// Extinction without the peak [1/m] and the mean of the sun's light over what there is in the cell.
+@group(2) @binding(1) var<storage, read_write> filled: array<vec2<f32>>;
+
+struct Way {
+    zeroth: vec4<f32>,
+    second: vec4<f32>,
+    middle: vec4<f32>,
+    third: vec4<f32>,
+    // Cells and strides along the axis of the sweep and across it, and the sense of the sweep.
+    counts: vec4<i32>,
+    strides: vec4<i32>,
+    // Where the ray comes from in the plane before, in cells, and the way from there [m].
+    shift: vec3<f32>,
+}
+
+@group(1) @binding(2) var<storage, read> ways: array<Way>;
+
+@group(1) @binding(3) var<storage, read> cells: array<vec2<f32>>;
+@group(1) @binding(4) var<storage, read> source: array<f32>;
+@group(2) @binding(2) var<storage, read_write> radiance: array<f32>;
+
+@group(1) @binding(5) var<storage, read> arrived: array<f32>;
+@group(1) @binding(6) var<storage, read> coarser: array<vec4<f32>>;
+@group(2) @binding(3) var<storage, read_write> sent: array<f32>;
+@group(2) @binding(4) var<storage, read_write> found_moments: array<vec4<f32>>;
+
+struct CubeRay {
+    origin: vec3<f32>,
+    dir: vec3<f32>,
+}
+
+struct CubeLight {
+    scatter: f32,
+    transmittance: f32,
+}
+
+@group(1) @binding(7) var<storage, read> rays: array<CubeRay>;
+// Rows of angles, columns of depths.
+@group(1) @binding(8) var<storage, read> peaks: array<f32>;
+@group(1) @binding(9) var<storage, read> moments: array<vec4<f32>>;
+@group(2) @binding(5) var<storage, read_write> results: array<CubeLight>;
+
+const PEAK_ANGLES: i32 = 128;
+const PEAK_DEPTHS: i32 = 64;
+
+// Light that the peak has scattered at least once, over what it leaves of the sun's: angles in squares, depths in squares up to 64.
+fn peak_light(angle: f32, depth: f32) -> f32 {
+    let x = clamp(sqrt(angle * 0.31830989), 0.0, 1.0) * f32(PEAK_ANGLES - 1);
+    let y = clamp(sqrt(depth / 64.0), 0.0, 1.0) * f32(PEAK_DEPTHS - 1);
+    let i = min(i32(x), PEAK_ANGLES - 2);
+    let j = min(i32(y), PEAK_DEPTHS - 2);
+    let at = i * PEAK_DEPTHS + j;
+    let fy = y - f32(j);
+    return mix(mix(peaks[at], peaks[at + 1], fy), mix(peaks[at + PEAK_DEPTHS], peaks[at + PEAK_DEPTHS + 1], fy), x - f32(i));
+}
+
+// What the cells scatter into the view.
+fn diffuse_source(point: vec3<f32>, view: Harmonics) -> f32 {
+    let q = clamp(point * vec3<f32>(grid.cells) - 0.5, vec3<f32>(0.0), vec3<f32>(grid.cells - 1));
+    let base = floor(q);
+    let f = q - base;
+    var sum = 0.0;
+    for (var j = 0; j < 8; j++) {
+        let offset = vec3<i32>(j & 1, (j >> 1u) & 1, j >> 2u);
+        let k = min(vec3<i32>(base) + offset, grid.cells - 1);
+        let w = select(1.0 - f, f, offset == vec3<i32>(1));
+        let at = 4 * ((k.z * grid.cells.y + k.y) * grid.cells.x + k.x);
+        sum += w.x * w.y * w.z * (dot(moments[at], view.zeroth) + dot(moments[at + 1], view.second) + dot(moments[at + 2], view.middle) + dot(moments[at + 3], view.third));
+    }
+    return max(sum, 0.0);
+}
+
+fn depth_to_sun(point: vec3<f32>) -> f32 {
+#ifdef CLOUD_READS_NODES
+    return baked_depth(point);
+#else
+    return marched_depth(point);
+#endif
+}
+
+#ifdef CLOUD_NODES
+@compute @workgroup_size(64)
+fn find_depths(@builtin(global_invocation_id) id: vec3<u32>) {
+    let n = grid.nodes;
+    let i = i32(id.x);
+    if i >= n * n * n {
+        return;
+    }
+    let at = vec3<f32>(vec3<i32>(i % n, (i / n) % n, i / (n * n))) / f32(n - 1);
+    depths[i] = marched_depth(at);
+}
+#else
+#ifdef CLOUD_CELLS
+@compute @workgroup_size(64)
+fn fill(@builtin(global_invocation_id) id: vec3<u32>) {
+    let n = grid.cells;
+    let i = i32(id.x);
+    if i >= n.x * n.y * n.z {
+        return;
+    }
+    let corner = vec3<f32>(vec3<i32>(i % n.x, (i / n.x) % n.y, i / (n.x * n.y)));
+    let kept = 1.0 - grid.albedo * grid.peak;
+    var sum = 0.0;
+    var lit = 0.0;
+    for (var j = 0; j < 64; j++) {
+        let part = (vec3<f32>(f32(j & 3), f32((j >> 2u) & 3), f32(j >> 4u)) + 0.5) * 0.25;
+        let point = (corner + part) / vec3<f32>(n);
+        let rho = density_at(point);
+        sum += rho;
+        lit += rho * exp(-kept * baked_depth(point));
+    }
+    filled[i] = vec2<f32>(kept * grid.extinction * sum / 64.0, lit / max(sum, 1e-30));
+}
+#else
+#ifdef CLOUD_SWEEP
+@compute @workgroup_size(256)
+fn sweep(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let way = ways[group.x];
+    let all = grid.cells.x * grid.cells.y * grid.cells.z;
+    let start = i32(group.x) * all;
+    let first = floor(way.shift.xy);
+    let part = way.shift.xy - first;
+    let plane_cells = way.counts.y * way.counts.z;
+    for (var plane = 0; plane < way.counts.x; plane++) {
+        let k = select(plane, way.counts.x - 1 - plane, way.counts.w < 0);
+        let before = k - way.counts.w;
+        let has_before = before >= 0 && before < way.counts.x;
+        for (var c = i32(lane); c < plane_cells; c += 256) {
+            let a = c % way.counts.y;
+            let b = c / way.counts.y;
+            let here = k * way.strides.x + a * way.strides.y + b * way.strides.z;
+            var sigma = 0.0;
+            var emitted = 0.0;
+            var arriving = 0.0;
+            for (var j = 0; j < 4; j++) {
+                let ja = j & 1;
+                let jb = j >> 1u;
+                let ka = a + i32(first.x) + ja;
+                let kb = b + i32(first.y) + jb;
+                let weight = select(1.0 - part.x, part.x, ja == 1) * select(1.0 - part.y, part.y, jb == 1);
+                let inside = has_before && ka >= 0 && ka < way.counts.y && kb >= 0 && kb < way.counts.z;
+                let at = select(here, before * way.strides.x + ka * way.strides.y + kb * way.strides.z, inside);
+                let thickness = select(0.0, weight * cells[at].x, inside);
+                sigma += thickness;
+                emitted += thickness * source[start + at];
+                arriving += weight * select(grid.uniform_light, radiance[start + at], inside);
+            }
+            let own = source[start + here];
+            let upstream = select(own, emitted / max(sigma, 1e-30), sigma > 1e-30);
+            let depth = 0.5 * (sigma + cells[here].x) * way.shift.z;
+            let left = exp(-depth);
+            let mean = one_minus_exp_over_x(depth);
+            radiance[start + here] = arriving * left + upstream * (mean - left) + own * (1.0 - mean);
+        }
+        storageBarrier();
+    }
+}
+#else
+#ifdef CLOUD_GATHER
+// What a cell scatters into each direction, from what comes to it and from the sun.
+@compute @workgroup_size(64)
+fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
+    let n = grid.cells;
+    let i = i32(id.x);
+    let all = n.x * n.y * n.z;
+    if i >= all {
+        return;
+    }
+    var sum = Harmonics(vec4<f32>(0.0), vec4<f32>(0.0), vec4<f32>(0.0), vec4<f32>(0.0));
+    let count = i32(arrayLength(&ways));
+    let d = grid.degrees;
+    let d_zeroth = vec4<f32>(d.x, d.y, d.y, d.y);
+    let d_middle = vec4<f32>(d.z, d.w, d.w, d.w);
+#ifdef CLOUD_PROLONG
+    let place = vec3<f32>(vec3<i32>(i % n.x, (i / n.x) % n.y, i / (n.x * n.y))) + 0.5;
+    let q = clamp(place / vec3<f32>(n) * vec3<f32>(grid.coarse) - 0.5, vec3<f32>(0.0), vec3<f32>(grid.coarse - 1));
+    let base = floor(q);
+    for (var j = 0; j < 8; j++) {
+        let offset = vec3<i32>(j & 1, (j >> 1u) & 1, j >> 2u);
+        let k = min(vec3<i32>(base) + offset, grid.coarse - 1);
+        let f = q - base;
+        let w = select(1.0 - f, f, offset == vec3<i32>(1));
+        let weight = w.x * w.y * w.z;
+        let at = 4 * ((k.z * grid.coarse.y + k.y) * grid.coarse.x + k.x);
+        sum.zeroth += weight * coarser[at];
+        sum.second += weight * coarser[at + 1];
+        sum.middle += weight * coarser[at + 2];
+        sum.third += weight * coarser[at + 3];
+    }
+#else
+    let share = 12.566371 / f32(count);
+    for (var j = 0; j < count; j++) {
+        let light = share * arrived[j * all + i];
+        sum.zeroth += light * ways[j].zeroth;
+        sum.second += light * ways[j].second;
+        sum.middle += light * ways[j].middle;
+        sum.third += light * ways[j].third;
+    }
+    sum.zeroth *= d_zeroth;
+    sum.second *= d.z;
+    sum.middle *= d_middle;
+    sum.third *= d.w;
+#endif
+    found_moments[4 * i] = sum.zeroth;
+    found_moments[4 * i + 1] = sum.second;
+    found_moments[4 * i + 2] = sum.middle;
+    found_moments[4 * i + 3] = sum.third;
+    let straight = harmonics(-grid.to_sun);
+    let lit = grid.sun * cells[i].y;
+    sum.zeroth += lit * d_zeroth * straight.zeroth;
+    sum.second += lit * d.z * straight.second;
+    sum.middle += lit * d_middle * straight.middle;
+    sum.third += lit * d.w * straight.third;
+    for (var j = 0; j < count; j++) {
+        sent[j * all + i] = dot(sum.zeroth, ways[j].zeroth) + dot(sum.second, ways[j].second) + dot(sum.middle, ways[j].middle) + dot(sum.third, ways[j].third);
+    }
+}
+#else
+@compute @workgroup_size(64)
+fn find(@builtin(global_invocation_id) id: vec3<u32>) {
+    if i32(id.x) >= grid.count {
+        return;
+    }
+    let ray = rays[id.x];
+    let span = cube_span(ray.origin, ray.dir);
+    let far = span.y;
+    var t = max(span.x, 0.0);
+    let nu = clamp(dot(ray.dir, grid.to_sun), -1.0, 1.0);
+    let angle = acos(nu);
+    let phase = phase_henyey_greenstein(nu, grid.g);
+    let kept = 1.0 - grid.albedo * grid.peak;
+    // Light goes against the view.
+    let view = harmonics(-ray.dir);
+    let straight = harmonics(-grid.to_sun);
+    let d = grid.degrees;
+    // Albedo and phase function without the peak, from the sun into the view.
+    let turned = dot(vec4<f32>(d.x, d.y, d.y, d.y) * straight.zeroth, view.zeroth) + d.z * dot(straight.second, view.second)
+        + dot(vec4<f32>(d.z, d.w, d.w, d.w) * straight.middle, view.middle) + d.w * dot(straight.third, view.third);
+    let deepest = select(14.0, 14.0 / max(kept, 0.01), grid.all_orders != 0);
+    var depth = 0.0;
+    var scatter = 0.0;
+    if t < far {
+        var rho = density_at(ray.origin + ray.dir * t);
+        var sun = 0.0;
+        var known = false;
+        for (var i = 0; i < 4000 && t < far && depth < deepest; i++) {
+            let ahead = density_at(ray.origin + ray.dir * min(t + grid.step, far));
+            let middle = density_at(ray.origin + ray.dir * min(t + 0.5 * grid.step, far));
+            let thickest = max(max(rho, ahead), middle) * grid.extinction * grid.size;
+            let ds = min(min(grid.step, max(grid.step_depth / max(thickest, 1e-20), 0.0333 * grid.step)), far - t + 1e-6);
+            let point = ray.origin + ray.dir * (t + ds);
+            let next = density_at(point);
+            let between = density_at(ray.origin + ray.dir * (t + 0.5 * ds));
+            let added = 0.16666667 * (rho + 4.0 * between + next) * grid.extinction * grid.size * ds;
+            if added > 0.0 {
+                if !known {
+                    sun = depth_to_sun(ray.origin + ray.dir * t);
+                }
+                let next_sun = depth_to_sun(point);
+                let left = exp(-depth);
+                if grid.all_orders == 0 {
+                    scatter += grid.sun * left * grid.albedo * phase * step_light(added, sun, next_sun);
+                } else {
+                    let left_kept = exp(-kept * depth);
+                    scatter += grid.sun * left * peak_light(angle, 0.5 * (sun + next_sun)) * step_light(added, kept * sun, kept * next_sun);
+                    scatter += grid.sun * left_kept * turned * step_light(kept * added, kept * sun, kept * next_sun);
+                    scatter += left_kept * one_minus_exp(kept * added) * diffuse_source(point - ray.dir * (0.5 * ds), view);
+                }
+                sun = next_sun;
+            }
+            known = added > 0.0;
+            depth += added;
+            rho = next;
+            t += ds;
+        }
+    }
+    let through = exp(-depth);
+    scatter += grid.uniform_light * (exp(-kept * depth) - through);
+    results[id.x] = CubeLight(scatter, through);
+}
+#endif
+#endif
+#endif
+#endif
+    }#
+}#
