@@ -164,7 +164,7 @@ mod tests {
         assert!(CloudDeck::named("fog").is_err());
         for (text, name) in [
             ("(coverage: 1.5)", "deck.coverage"),
-            ("(extinction: nan)", "deck.extinction"),
+            ("(extinction: NaN)", "deck.extinction"),
             ("(cover: 1)", "no clouds"),
         ] {
             let error = CloudDeck::from_ron(text).unwrap_err().to_string();

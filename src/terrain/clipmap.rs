@@ -97,7 +97,6 @@ impl SweptSun {
             lower: tangent(elevation - self.angular_radius) as f32,
             growth: ((1.0 + middle * middle) / planet_radius) as f32,
             sign: if main < 0.0 { -1.0 } else { 1.0 },
-            ..Default::default()
         }
     }
 }
@@ -479,7 +478,6 @@ impl Clipmap {
             samplers: 1,
             textures: 3 + u32::from(shaded > 0),
             texture_bytes: level * self.levels as u64 + shades + sectors + 512,
-            ..Default::default()
         }
     }
 
@@ -604,7 +602,6 @@ impl Clipmap {
             texels: self.texels as i32,
             first: self.first as i32,
             levels: self.levels as i32,
-            ..Default::default()
         };
         let bytes = clip.to_bytes().to_vec();
         if bytes != self.clip_bytes {

@@ -41,7 +41,7 @@ pub fn hit_errors(
     found: &[TerrainHit],
 ) -> Result<HitErrors, Error> {
     land.check()?;
-    if columns == 0 || rays.len() % columns != 0 || found.len() != rays.len() {
+    if columns == 0 || !rays.len().is_multiple_of(columns) || found.len() != rays.len() {
         return Err(Error::OutOfDomain {
             name: "hits and columns".to_owned(),
             value: format!("{} and {columns}", found.len()),

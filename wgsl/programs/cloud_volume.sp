@@ -383,7 +383,8 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let through = exp(-depth);
     scatter += grid.uniform_light * (exp(-kept * depth) - through);
-    results[id.x] = CubeLight(scatter, through);
+    // Four degrees of a needle can fall a little below nothing.
+    results[id.x] = CubeLight(max(scatter, 0.0), through);
 }
 #endif
 #endif

@@ -23,7 +23,7 @@ pub const PRESETS: [&str; 2] = ["high", "low"];
 /// Samples a pixel of converged pictures, in each direction.
 const SAMPLES: u32 = 8;
 
-/// Speed of the flight [m/s], and its frames a second.
+/// Speed of the flight (m/s), and its frames a second.
 const FLIGHT: (f64, f64) = (100.0, 30.0);
 
 /// What is measured.
@@ -42,13 +42,13 @@ pub struct Plan {
 pub struct Entry {
     /// Milliseconds of a draw, by round.
     pub draws: Vec<f64>,
-    /// The first bake [ms].
+    /// The first bake (ms).
     pub first_bake: f64,
-    /// Bakes in a flight, by frame [ms].
+    /// Bakes in a flight, by frame (ms).
     pub bakes: Vec<f64>,
-    /// Draws in that flight [ms].
+    /// Draws in that flight (ms).
     pub flown: Vec<f64>,
-    /// Against its own converged picture [dB].
+    /// Against its own converged picture (dB).
     pub psnr: f64,
 }
 
@@ -61,7 +61,7 @@ pub struct Line {
     pub ground: f64,
     /// Milliseconds of the preset `thesis`, by round.
     pub thesis: Vec<f64>,
-    /// `thesis` against its own converged picture [dB].
+    /// `thesis` against its own converged picture (dB).
     pub thesis_psnr: f64,
     /// The presets.
     pub presets: Vec<Entry>,
@@ -323,7 +323,7 @@ fn flown(view: &View, frame: usize) -> View {
         .transform_vector3(Vec3::NEG_Z)
         .as_dvec3();
     let azimuth = forward.x.atan2(-forward.z);
-    let mut view = view.clone();
+    let mut view = *view;
     view.eye = view
         .eye
         .moved_by(direction(0.0, azimuth) * (FLIGHT.0 / FLIGHT.1 * frame as f64));
