@@ -120,8 +120,11 @@ pub fn ray_hits(
     let constants = [
         ("FIELD_KIND", f64::from(land.field.kind.number())),
         ("MAX_MARCHING_STEPS", 4000.0),
+        ("REFINE_STEPS", 2.0),
     ];
-    let (pipeline, layouts) = compute(device, programs, "terrain_rays", features, &constants)?;
+    // The march has no steps of refinement.
+    let constants = &constants[..if fast { 3 } else { 2 }];
+    let (pipeline, layouts) = compute(device, programs, "terrain_rays", features, constants)?;
     use wgpu::BufferUsages as Usage;
     let buffer = |label, size: usize, usage| {
         device.create_buffer(&wgpu::BufferDescriptor {
@@ -163,9 +166,11 @@ pub fn ray_hits(
         let exchange = Exchange::new(device, queue, &rows, 48 * count);
         let groups = if let Some(clipmap) = &mut clipmap {
             let above = (eye.altitude() - f64::from(field.ground(eye, 0.0).height)).abs();
+            let above = if above.is_finite() { above } else { 1.0 };
             let gaze = Gaze {
-                least: 0.0,
-                near: if above.is_finite() { above } else { 1.0 },
+                // As for pictures: nothing seen is much nearer than the ground below.
+                least: 0.35 * f64::from(pixel_angle) * above,
+                near: above,
                 far: farthest,
                 azimuths: [0.0, std::f64::consts::TAU],
                 sun: None,

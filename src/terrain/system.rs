@@ -185,7 +185,7 @@ impl PlaneTerrain {
             ("FIELD_KIND", f64::from(options.land.field.kind.number())),
             ("OUTPUT", output),
             ("MAX_MARCHING_STEPS", if low { 250.0 } else { 500.0 }),
-            ("REFINE_STEPS", if low { 0.0 } else { 1.0 }),
+            ("REFINE_STEPS", if low { 0.0 } else { 2.0 }),
             ("ROCK_CHEAP", f64::from(u8::from(low))),
             ("SKY_SECTORS", f64::from(options.sky_sectors)),
         ];

@@ -44,8 +44,10 @@ fn sweep(@builtin(local_invocation_index) index: u32, @builtin(workgroup_id) gro
             var top = -1e30;
             for (var level = first; level <= last; level++) {
                 let place = textureLoad(places, vec2<i32>(level, 0), 0);
-                let corner = vec2<i32>(floor(place.xy + low * place.z));
-                let count = vec2<i32>(floor(place.xy + high * place.z)) - corner + 2;
+                // The part of the ring that this level serves.
+                let edge = vec2<f32>((clip.reach + 1.0) * place.w);
+                let corner = vec2<i32>(floor(place.xy + max(low, -edge) * place.z));
+                let count = vec2<i32>(floor(place.xy + min(high, edge) * place.z)) - corner + 2;
                 for (var z = 0; z < count.y; z += 2) {
                     for (var x = 0; x < count.x; x += 2) {
                         let h = corners(heights, wrapping, clip, corner + vec2<i32>(x, z), level);

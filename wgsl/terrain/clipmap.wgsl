@@ -201,6 +201,8 @@ fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_
         }
         ring += select(0, 1, t >= end);
     }
+    // A ring may reach beyond the end of the ray.
+    hit.distance = select(hit.distance, -1.0, hit.distance > far);
     return hit;
 }
 
