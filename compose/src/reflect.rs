@@ -284,7 +284,15 @@ pub(crate) fn stage(
             },
         });
     }
-    let filtered = filtered(module);
+    let mut filtered = filtered(module);
+    // A sampler that filters wants textures that can be, where it only gathers too.
+    for index in 0..module.entry_points.len() {
+        for key in &info.get_entry_point(index).sampling_set {
+            if filtered.contains(&key.sampler) {
+                filtered.insert(key.image);
+            }
+        }
+    }
     let mut used: BTreeSet<Handle<naga::GlobalVariable>> = BTreeSet::new();
     for index in 0..module.entry_points.len() {
         let entry = info.get_entry_point(index);

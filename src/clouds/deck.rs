@@ -107,6 +107,13 @@ impl CloudDeck {
                 ));
             }
         }
+        if self.period() > 1e9 {
+            return Err(fault(
+                "deck.wavelength with deck.period_doublings",
+                self.period(),
+                "a period of at most 1e9 m",
+            ));
+        }
         Ok(())
     }
 

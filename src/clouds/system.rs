@@ -195,6 +195,21 @@ impl Clouds {
                 "a float format: clouds are laid over scene radiance",
             ));
         }
+        let wide = matches!(
+            targets.color_format,
+            wgpu::TextureFormat::Rgba32Float | wgpu::TextureFormat::Rg32Float
+        );
+        if wide
+            && !device
+                .features()
+                .contains(wgpu::Features::FLOAT32_BLENDABLE)
+        {
+            return Err(fault(
+                "targets.color_format",
+                format!("{:?}", targets.color_format),
+                "a format that blends: of 32 bits only on a device with FLOAT32_BLENDABLE",
+            ));
+        }
         if targets.projection == Projection::Orthographic {
             return Err(fault("targets.projection", "Orthographic", "Perspective"));
         }
@@ -409,6 +424,8 @@ impl Clouds {
         self.seen = !self.deck.is_empty() && self.may_show(eye.altitude(), [middle, right, up]);
         let mut work = Work::default();
         if !self.seen {
+            // The way of the sun meanwhile is not that of a frame.
+            self.last_sun = None;
             return Ok(work);
         }
         let to_sun = view.sun.to_light.normalize_or(Vec3::Y);

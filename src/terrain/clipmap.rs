@@ -712,6 +712,7 @@ impl Clipmap {
             send(&shades.levels[level].buffer, &shade.to_bytes());
             levels.push(level);
         }
+        work.bakes += levels.len() as u32;
         levels
     }
 }

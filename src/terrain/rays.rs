@@ -93,6 +93,13 @@ pub fn ray_hits(
     for (i, ray) in rays.iter().enumerate() {
         ray.check(i)?;
     }
+    if !(pixel_angle.is_finite() && pixel_angle > 0.0) {
+        return Err(Error::OutOfDomain {
+            name: "pixel_angle".to_owned(),
+            value: pixel_angle.to_string(),
+            domain: "finite and above 0 rad".to_owned(),
+        });
+    }
     if land.field.on_sphere() {
         return super::globe_rays::hits(gpu, programs, land, rays, pixel_angle, path);
     }
@@ -255,6 +262,15 @@ impl<T: Real> Prepared<T> {
         least: f64,
     ) -> Result<TerrainHit, Error> {
         ray.check(0)?;
+        for (name, value) in [("least", least), ("pixel_angle", pixel_angle)] {
+            if !(value.is_finite() && value >= 0.0 && (name != "least" || value > 0.0)) {
+                return Err(Error::OutOfDomain {
+                    name: name.to_owned(),
+                    value: value.to_string(),
+                    domain: "finite and at least 0; the least step above 0".to_owned(),
+                });
+            }
+        }
         let eye = self.place(ray.origin);
         let start = ray.origin.altitude();
         let radius = planet_radius + start;

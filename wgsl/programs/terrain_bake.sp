@@ -144,7 +144,9 @@ fn darken(@builtin(global_invocation_id) id: vec3<u32>) {
         let cell = vec2<i32>(select(vec2<f32>(along, whole), vec2<f32>(whole, along), sweep.axis == 1));
         let middle = vec2<f32>(((shade.corner + cell) & mask) + 1) / texels;
         let h = textureGather(0, heights, wrapping, middle, shade.level);
-        height = mix(h.w, select(h.x, h.z, sweep.axis == 1), side - whole);
+        // Beyond the last texel of the side is the other border.
+        let beside = select(select(h.x, h.z, sweep.axis == 1), h.w, whole >= texels - 1.0);
+        height = mix(h.w, beside, side - whole);
         textureStore(shades, vec2<i32>(i32(along), i32(id.x)), 0, vec4<f32>(shadow, 0.0, 0.0));
     }
 }

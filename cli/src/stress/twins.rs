@@ -63,7 +63,7 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
     ),
     (
         "veduta::terrain::clipmap::baked_height",
-        "rays_over_baked_heights_meet_the_field",
+        "valleys_see_less_of_the_sky",
     ),
     (
         "veduta::terrain::clipmap::clip_hit",
