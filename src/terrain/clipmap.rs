@@ -183,7 +183,7 @@ pub struct Clipmap {
     /// Heights, tangents by sector and ring, places of the levels.
     pub(super) views: [wgpu::TextureView; 3],
     /// Sectors around the eye; the first that is made, and how many are.
-    pub(super) sectors: [i32; 3],
+    sectors: [i32; 3],
     pub(super) wrapping: wgpu::Sampler,
     shades: Option<Shades>,
     /// The uniform `Sweep`.

@@ -6,7 +6,7 @@ use super::ground::Prepared;
 use super::land::Land;
 use super::noise::octave_seed;
 use super::noise_3d::{Place3d, craters_3d, gradient_noise_3d};
-use super::rays::{TerrainHit, TerrainRay};
+use super::rays::{Search, TerrainHit, TerrainRay, altitude_along};
 use super::real::Real;
 use crate::error::Error;
 use crate::programs::blocks::Globe as GlobeBlock;
@@ -323,13 +323,8 @@ impl<T: Real> Globe<T> {
         let start = self.altitude(ray.origin);
         let radius = self.radius + start;
         let mu = dot(eye, ray.dir) / radius;
-        let top = self.bounds.maximum;
         let at = |t: f64| std::array::from_fn(|k| eye[k] + ray.dir[k] * t);
-        // Altitude without cancellation.
-        let altitude = |t: f64| {
-            let q = t * (t + 2.0 * radius * mu);
-            start + q / (radius + (radius * radius + q).max(0.0).sqrt())
-        };
+        let altitude = |t: f64| altitude_along(start, radius, mu, t);
         let ground = |t: f64| {
             let place = self.place_of(at(t));
             (place, self.ground_at(place, T::of(pixel_angle * t)))
@@ -348,42 +343,16 @@ impl<T: Real> Globe<T> {
                 capped: false,
             }
         };
-        let far = ray.far.min(1e9);
-        let mut t = 0.0;
-        if clearance(0.0) <= 0.0 {
-            return Ok(hit(0.0));
-        }
-        while t < far {
-            let above = altitude(t) - top;
-            if above > 0.0 {
-                let q = t * (t + 2.0 * radius * mu);
-                let rise = (radius * mu + t) / (radius * radius + q).max(1.0).sqrt();
-                if rise >= 0.0 {
-                    return Ok(TerrainHit::MISS);
-                }
-                // Altitude is convex: the tangent comes down to the highest ground before the ray does.
-                t += (above / -rise).max(1e-3);
-                continue;
-            }
-            let next = (t + (0.5 * pixel_angle * t).max(least)).min(far);
-            if clearance(next) <= 0.0 {
-                let (mut clear, mut below) = (t, next);
-                for _ in 0..60 {
-                    let middle = 0.5 * (clear + below);
-                    if middle <= clear || middle >= below {
-                        break;
-                    }
-                    if clearance(middle) <= 0.0 {
-                        below = middle;
-                    } else {
-                        clear = middle;
-                    }
-                }
-                return Ok(hit(clear));
-            }
-            t = next;
-        }
-        Ok(TerrainHit::MISS)
+        let search = Search {
+            start,
+            radius,
+            mu,
+            top: self.bounds.maximum,
+            far: ray.far.min(1e9),
+            pixel_angle,
+            least,
+        };
+        Ok(search.first(clearance)?.map_or(TerrainHit::MISS, hit))
     }
 }
 

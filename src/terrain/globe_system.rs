@@ -5,10 +5,10 @@ use glam::Vec3;
 use super::clipmap::group;
 use super::globe::Globe;
 use super::land::Land;
-use super::system::{TerrainLights, TerrainOptions};
+use super::system::{TerrainLights, TerrainOptions, surface_pipeline};
 use crate::error::Error;
 use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
-use crate::program::{Pipeline, PipelineOptions, ProgramSet};
+use crate::program::ProgramSet;
 use crate::programs::blocks::{
     Globe as GlobeBlock, GlobeLight as LightBlock, GlobeView as ViewBlock, Rock as RockBlock,
 };
@@ -80,30 +80,14 @@ impl GlobeTerrain {
             ("MAX_MARCHING_STEPS", if low { 300.0 } else { 600.0 }),
             ("MAX_MARCHING_STEPS_SHADOW", if low { 16.0 } else { 40.0 }),
         ];
-        let ready = programs.get("terrain_globe", &[])?.pipeline(
+        let (pipeline, layouts) = surface_pipeline(
             device,
-            &PipelineOptions {
-                targets: &[Some(targets.color_format.into())],
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format,
-                    depth_write_enabled: Some(true),
-                    depth_compare: Some(match targets.depth {
-                        Depth::Normal => wgpu::CompareFunction::Less,
-                        Depth::Reversed | Depth::ReversedInfinite => wgpu::CompareFunction::Greater,
-                    }),
-                    stencil: Default::default(),
-                    bias: Default::default(),
-                }),
-                sample_count: targets.sample_count,
-                constants: &constants,
-                ..Default::default()
-            },
+            programs,
+            "terrain_globe",
+            targets,
+            format,
+            &constants,
         )?;
-        let Pipeline::Render(pipeline) = ready.pipeline else {
-            return Err(Error::MissingStage {
-                program: "terrain_globe".to_owned(),
-            });
-        };
         let buffer = |label, size: usize| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -119,7 +103,7 @@ impl GlobeTerrain {
         ];
         let entries = buffers.each_ref().map(|b| b.as_entire_binding());
         Ok(GlobeTerrain {
-            group: group(device, &ready.bind_group_layouts[0], &entries),
+            group: group(device, &layouts[0], &entries),
             globe,
             land: options.land.clone(),
             far: options.far,

@@ -246,6 +246,90 @@ pub fn ray_hits(
     Ok(hits)
 }
 
+/// Altitude at a distance along a ray from altitude `start`, without cancellation; `mu` is its zenith cosine there.
+pub(super) fn altitude_along(start: f64, radius: f64, mu: f64, t: f64) -> f64 {
+    let q = t * (t + 2.0 * radius * mu);
+    start + q / (radius + (radius * radius + q).max(0.0).sqrt())
+}
+
+/// Where a ray is looked for the ground, and how finely.
+pub(super) struct Search {
+    /// Altitude of its start and distance of that from the planet's centre (m).
+    pub start: f64,
+    pub radius: f64,
+    /// Its zenith cosine there.
+    pub mu: f64,
+    /// No ground is above (m).
+    pub top: f64,
+    /// It ends here (m).
+    pub far: f64,
+    pub pixel_angle: f64,
+    /// Least step (m).
+    pub least: f64,
+}
+
+impl Search {
+    /// The first distance at which the clearance is gone, by steps of half a footprint and bisection.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for a least step that is not above 0 and an angle that is below it.
+    pub fn first(&self, clearance: impl Fn(f64) -> f64) -> Result<Option<f64>, Error> {
+        for (name, value) in [("least", self.least), ("pixel_angle", self.pixel_angle)] {
+            if !(value.is_finite() && value >= 0.0 && (name != "least" || value > 0.0)) {
+                return Err(Error::OutOfDomain {
+                    name: name.to_owned(),
+                    value: value.to_string(),
+                    domain: "finite and at least 0; the least step above 0".to_owned(),
+                });
+            }
+        }
+        let &Search {
+            start,
+            radius,
+            mu,
+            top,
+            far,
+            pixel_angle,
+            least,
+        } = self;
+        let mut t = 0.0;
+        if clearance(0.0) <= 0.0 {
+            return Ok(Some(0.0));
+        }
+        while t < far {
+            let above = altitude_along(start, radius, mu, t) - top;
+            if above > 0.0 {
+                let q = t * (t + 2.0 * radius * mu);
+                let rise = (radius * mu + t) / (radius * radius + q).max(1.0).sqrt();
+                if rise >= 0.0 {
+                    return Ok(None);
+                }
+                // Altitude is convex: the tangent comes down to the highest ground before the ray does.
+                t += (above / -rise).max(1e-3);
+                continue;
+            }
+            let next = (t + (0.5 * pixel_angle * t).max(least)).min(far);
+            if clearance(next) <= 0.0 {
+                let (mut clear, mut below) = (t, next);
+                for _ in 0..60 {
+                    let middle = 0.5 * (clear + below);
+                    if middle <= clear || middle >= below {
+                        break;
+                    }
+                    if clearance(middle) <= 0.0 {
+                        below = middle;
+                    } else {
+                        clear = middle;
+                    }
+                }
+                return Ok(Some(clear));
+            }
+            t = next;
+        }
+        Ok(None)
+    }
+}
+
 impl<T: Real> Prepared<T> {
     /// The first place where a ray meets the field as its footprint filters it, by bracketing: steps of half a footprint, at least `least` metres, and
     /// bisection. A stretch below the ground that is shorter than a step may be missed; nothing else can be. Above `top` (m) there is no ground, see
@@ -262,23 +346,10 @@ impl<T: Real> Prepared<T> {
         least: f64,
     ) -> Result<TerrainHit, Error> {
         ray.check(0)?;
-        for (name, value) in [("least", least), ("pixel_angle", pixel_angle)] {
-            if !(value.is_finite() && value >= 0.0 && (name != "least" || value > 0.0)) {
-                return Err(Error::OutOfDomain {
-                    name: name.to_owned(),
-                    value: value.to_string(),
-                    domain: "finite and at least 0; the least step above 0".to_owned(),
-                });
-            }
-        }
         let eye = self.place(ray.origin);
         let start = ray.origin.altitude();
         let radius = planet_radius + start;
-        // Altitude without cancellation.
-        let altitude = |t: f64| {
-            let q = t * (t + 2.0 * radius * ray.dir[1]);
-            start + q / (radius + (radius * radius + q).max(0.0).sqrt())
-        };
+        let altitude = |t: f64| altitude_along(start, radius, ray.dir[1], t);
         let ground = |t: f64| {
             let offset = [ray.dir[0] * t, ray.dir[2] * t].map(T::of);
             self.ground_from(eye, offset, T::of(pixel_angle * t))
@@ -302,41 +373,15 @@ impl<T: Real> Prepared<T> {
                 capped: false,
             }
         };
-        let far = ray.far.min(1e7);
-        let mut t = 0.0;
-        if clearance(0.0) <= 0.0 {
-            return Ok(hit(0.0));
-        }
-        while t < far {
-            let above = altitude(t) - top;
-            if above > 0.0 {
-                let q = t * (t + 2.0 * radius * ray.dir[1]);
-                let rise = (radius * ray.dir[1] + t) / (radius * radius + q).max(1.0).sqrt();
-                if rise >= 0.0 {
-                    return Ok(TerrainHit::MISS);
-                }
-                // Altitude is convex: the tangent comes down to the highest ground before the ray does.
-                t += (above / -rise).max(1e-3);
-                continue;
-            }
-            let next = (t + (0.5 * pixel_angle * t).max(least)).min(far);
-            if clearance(next) <= 0.0 {
-                let (mut clear, mut below) = (t, next);
-                for _ in 0..60 {
-                    let middle = 0.5 * (clear + below);
-                    if middle <= clear || middle >= below {
-                        break;
-                    }
-                    if clearance(middle) <= 0.0 {
-                        below = middle;
-                    } else {
-                        clear = middle;
-                    }
-                }
-                return Ok(hit(clear));
-            }
-            t = next;
-        }
-        Ok(TerrainHit::MISS)
+        let search = Search {
+            start,
+            radius,
+            mu: ray.dir[1],
+            top,
+            far: ray.far.min(1e7),
+            pixel_angle,
+            least,
+        };
+        Ok(search.first(clearance)?.map_or(TerrainHit::MISS, hit))
     }
 }

@@ -102,6 +102,42 @@ pub(super) struct PlaneTerrain {
     seen: bool,
 }
 
+/// A pipeline that draws ground into targets with a depth of the given format, and the layouts of its groups.
+pub(super) fn surface_pipeline(
+    device: &wgpu::Device,
+    programs: &ProgramSet,
+    program: &str,
+    targets: &Targets,
+    depth_format: wgpu::TextureFormat,
+    constants: &[(&str, f64)],
+) -> Result<(wgpu::RenderPipeline, Vec<wgpu::BindGroupLayout>), Error> {
+    let ready = programs.get(program, &[])?.pipeline(
+        device,
+        &PipelineOptions {
+            targets: &[Some(targets.color_format.into())],
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: depth_format,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(match targets.depth {
+                    Depth::Normal => wgpu::CompareFunction::Less,
+                    Depth::Reversed | Depth::ReversedInfinite => wgpu::CompareFunction::Greater,
+                }),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            sample_count: targets.sample_count,
+            constants,
+            ..Default::default()
+        },
+    )?;
+    match ready.pipeline {
+        Pipeline::Render(pipeline) => Ok((pipeline, ready.bind_group_layouts)),
+        Pipeline::Compute(_) => Err(Error::MissingStage {
+            program: program.to_owned(),
+        }),
+    }
+}
+
 /// The azimuths that a picture shows, from +x towards +z: the first and the extent (rad), from the ray through its middle and those from there to its borders.
 fn azimuths([middle, right, up]: [Vec3; 3]) -> [f64; 2] {
     let [middle, right, up] = [middle, right, up].map(|v| v.as_dvec3());
@@ -189,30 +225,14 @@ impl PlaneTerrain {
             ("ROCK_CHEAP", f64::from(u8::from(low))),
             ("SKY_SECTORS", f64::from(options.sky_sectors)),
         ];
-        let ready = programs.get("terrain", &[])?.pipeline(
+        let (pipeline, layouts) = surface_pipeline(
             device,
-            &PipelineOptions {
-                targets: &[Some(targets.color_format.into())],
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: depth_format,
-                    depth_write_enabled: Some(true),
-                    depth_compare: Some(match targets.depth {
-                        Depth::Normal => wgpu::CompareFunction::Less,
-                        Depth::Reversed | Depth::ReversedInfinite => wgpu::CompareFunction::Greater,
-                    }),
-                    stencil: Default::default(),
-                    bias: Default::default(),
-                }),
-                sample_count: targets.sample_count,
-                constants: &constants,
-                ..Default::default()
-            },
+            programs,
+            "terrain",
+            targets,
+            depth_format,
+            &constants,
         )?;
-        let Pipeline::Render(pipeline) = ready.pipeline else {
-            return Err(Error::MissingStage {
-                program: "terrain".to_owned(),
-            });
-        };
         let buffer = |label, size: usize| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -230,7 +250,7 @@ impl PlaneTerrain {
         let groups = vec![
             group(
                 device,
-                &ready.bind_group_layouts[0],
+                &layouts[0],
                 &[
                     view.as_entire_binding(),
                     field.as_entire_binding(),
@@ -241,7 +261,7 @@ impl PlaneTerrain {
             ),
             group(
                 device,
-                &ready.bind_group_layouts[1],
+                &layouts[1],
                 &[
                     texture(heights),
                     texture(sectors),
@@ -363,9 +383,6 @@ impl PlaneTerrain {
             snow_edge_high: m.snow_edge_high,
             snow_albedo: m.snow,
             snow_noise: m.snow_noise,
-            sectors: self.clipmap.sectors[0],
-            first_sector: self.clipmap.sectors[1],
-            made_sectors: self.clipmap.sectors[2],
             snow_line: m.snow_line,
             ..Default::default()
         };

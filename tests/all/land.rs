@@ -432,3 +432,26 @@ fn valleys_see_less_of_the_sky() {
     );
     assert!(judged > 150.0 && off < 0.08 && off < 0.6 * flat);
 }
+
+#[test]
+fn searches_without_steps_are_refused() {
+    let land = Land::named("thesis").unwrap();
+    let field = land.field.prepare::<f64>().unwrap();
+    let ball = Land::named("terra").unwrap();
+    let globe = ball.globe::<f64>().unwrap();
+    let ray = TerrainRay {
+        origin: WorldPos::from_metres([0.0, 9e3, 0.0].into()),
+        dir: [0.0, -1.0, 0.0],
+        far: 1e4,
+    };
+    for (angle, least) in [(0.01, 0.0), (0.01, f64::NAN), (f64::NAN, 0.1), (-1.0, 0.1)] {
+        for error in [
+            field.ray_hit(land.planet_radius, 1e4, &ray, angle, least),
+            globe.ray_hit(&ray, angle, least),
+        ] {
+            let error = error.unwrap_err().to_string();
+            let name = if least > 0.0 { "pixel_angle" } else { "least" };
+            assert!(error.contains(name), "{error}");
+        }
+    }
+}

@@ -31,10 +31,6 @@ struct TerrainView {
     snow_edge_high: f32,
     snow_albedo: vec3<f32>,
     snow_noise: f32,
-    // Sectors around the eye, and those that were made.
-    sectors: i32,
-    first_sector: i32,
-    made_sectors: i32,
     // Height below which no snow lies [m].
     snow_line: f32,
 }
@@ -46,10 +42,13 @@ struct TerrainView {
 #VERTEX{
     #USE{ VARYING }#
     #CODE{
+#import veduta::terrain::clipmap::{Clip}
+
+@group(0) @binding(2) var<uniform> clip: Clip;
 @group(1) @binding(1) var sectors: texture_2d<f32>;
 
-fn ray_through(clip: vec2<f32>) -> vec3<f32> {
-    return draw_view.ray_middle + clip.x * draw_view.ray_right + clip.y * draw_view.ray_up;
+fn ray_through(at: vec2<f32>) -> vec3<f32> {
+    return draw_view.ray_middle + at.x * draw_view.ray_right + at.y * draw_view.ray_up;
 }
 
 // Tiles of the picture, 16 across and 12 down, two triangles each; those in which all rays pass above the ground around them have no size.
@@ -60,7 +59,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
     let k = select(select(3u, corner % 3u, corner == 4u), select(corner, 2u, corner == 3u), corner < 4u);
     let size = vec2<f32>(0.125, 0.16666667);
     let place = vec2<f32>(f32(tile % 16u), f32(tile / 16u));
-    let clip = (place + vec2<f32>(f32(k & 1u), f32(k >> 1u))) * size - 1.0;
+    let at = (place + vec2<f32>(f32(k & 1u), f32(k >> 1u))) * size - 1.0;
     let middle = ray_through((place + 0.5) * size - 1.0);
     // Least tangent of the elevation and the azimuths of the corners: along an edge, which is a great circle, the tangent is a cosine of the azimuth.
     var least = 1e30;
@@ -76,17 +75,17 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
     // Tiles around the zenith see all sectors.
     let wide = right - left > 1.2;
     let azimuth = atan2(middle.z, middle.x);
-    let by_radian = f32(draw_view.sectors) * 0.15915494309;
-    let first = select(i32(floor((azimuth + left - 1e-3) * by_radian)), draw_view.first_sector, wide);
-    let last = select(i32(floor((azimuth + right + 1e-3) * by_radian)), draw_view.first_sector + draw_view.made_sectors - 1, wide);
+    let by_radian = f32(clip.sectors) * 0.15915494309;
+    let first = select(i32(floor((azimuth + left - 1e-3) * by_radian)), clip.first_sector, wide);
+    let last = select(i32(floor((azimuth + right + 1e-3) * by_radian)), clip.first_sector + clip.made_sectors - 1, wide);
     let column = i32(textureDimensions(sectors).x) - 1;
     var skyline = -1e30;
     for (var j = first; j <= last; j++) {
-        skyline = max(skyline, textureLoad(sectors, vec2<i32>(column, j & (draw_view.sectors - 1)), 0).x);
+        skyline = max(skyline, textureLoad(sectors, vec2<i32>(column, j & (clip.sectors - 1)), 0).x);
     }
     let lower = least / select(max(cos(right - left), 0.3), 1.0, least > 0.0);
     let seen = skyline >= lower - 1e-3 * (1.0 + abs(lower)) || (wide && least < 0.0);
-    return Corner(vec4<f32>(select(vec2<f32>(0.0), clip, seen), 0.5, 1.0), ray_through(clip));
+    return Corner(vec4<f32>(select(vec2<f32>(0.0), at, seen), 0.5, 1.0), ray_through(at));
 }
     }#
 }#

@@ -337,20 +337,29 @@ fn clouds(args: &CloudsArgs) -> Result<(), CliError> {
     write_results(&args.out, &light, 6, ResultKind::F32)
 }
 
+/// What is shipped under a name, or what a `.ron` file says.
+fn named_or_file<T>(
+    name: &str,
+    named: impl Fn(&str) -> Result<T, veduta::Error>,
+    from_ron: impl Fn(&str) -> Result<T, veduta::Error>,
+) -> Result<T, CliError> {
+    let path = Path::new(name);
+    if path.extension().is_none_or(|e| e != "ron") {
+        return Ok(named(name)?);
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| CliError::read(path, e))?;
+    from_ron(&text).map_err(|e| CliError::Table {
+        path: path.to_owned(),
+        what: e.to_string(),
+    })
+}
+
 /// A shipped layer of clouds by its name, or that of a `.ron` file.
 ///
 /// # Errors
 /// [`CliError::Read`], [`CliError::Table`] with the file and what is wrong in it, a name that does not exist.
 pub fn deck(name: &str) -> Result<CloudDeck, CliError> {
-    let path = Path::new(name);
-    if path.extension().is_none_or(|e| e != "ron") {
-        return Ok(CloudDeck::named(name)?);
-    }
-    let text = std::fs::read_to_string(path).map_err(|e| CliError::read(path, e))?;
-    CloudDeck::from_ron(&text).map_err(|e| CliError::Table {
-        path: path.to_owned(),
-        what: e.to_string(),
-    })
+    named_or_file(name, CloudDeck::named, CloudDeck::from_ron)
 }
 
 fn layer(args: &CloudsArgs) -> Result<(), CliError> {
@@ -423,15 +432,7 @@ fn layer(args: &CloudsArgs) -> Result<(), CliError> {
 /// # Errors
 /// [`CliError::Read`], [`CliError::Table`] with the file and what is wrong in it, a name that does not exist.
 pub fn land(name: &str) -> Result<Land, CliError> {
-    let path = Path::new(name);
-    if path.extension().is_none_or(|e| e != "ron") {
-        return Ok(Land::named(name)?);
-    }
-    let text = std::fs::read_to_string(path).map_err(|e| CliError::read(path, e))?;
-    Land::from_ron(&text).map_err(|e| CliError::Table {
-        path: path.to_owned(),
-        what: e.to_string(),
-    })
+    named_or_file(name, Land::named, Land::from_ron)
 }
 
 fn terrain(args: &TerrainArgs) -> Result<(), CliError> {
@@ -636,15 +637,7 @@ fn ball_height(args: &HeightArgs, land: &Land) -> Result<(), CliError> {
 /// # Errors
 /// [`CliError::Read`], [`CliError::Table`] with the file and what is wrong in it, a name that does not exist.
 pub fn atmosphere(name: &str) -> Result<Atmosphere, CliError> {
-    let path = Path::new(name);
-    if path.extension().is_none_or(|e| e != "ron") {
-        return Ok(Atmosphere::named(name)?);
-    }
-    let text = std::fs::read_to_string(path).map_err(|e| CliError::read(path, e))?;
-    Atmosphere::from_ron(&text).map_err(|e| CliError::Table {
-        path: path.to_owned(),
-        what: e.to_string(),
-    })
+    named_or_file(name, Atmosphere::named, Atmosphere::from_ron)
 }
 
 fn sky(args: &SkyArgs) -> Result<(), CliError> {

@@ -312,12 +312,13 @@ fn gathers_do_not_filter() {
         "m.wgsl",
         "#define_import_path t::m\nfn inner(t: texture_2d<f32>, s: sampler, at: vec2f) -> f32 { return textureGather(0, t, s, at).x; }\n\
          fn gathered(t: texture_2d<f32>, s: sampler, at: vec2f) -> f32 { var sum = 0.0; loop { sum += inner(t, s, at); if sum > 1.0 { break; } } return sum; }\n\
-         fn sampled(t: texture_2d<f32>, s: sampler, at: vec2f) -> f32 { if at.x > 0.0 { return textureSampleLevel(t, s, at, 0.0).x; } return 0.0; }\n",
+         fn sampled(t: texture_2d<f32>, s: sampler, at: vec2f) -> f32 { if at.x > 0.0 { return textureSampleLevel(t, s, at, 0.0).x; } return 0.0; }\n\
+         fn beside(o: texture_2d<f32>, t: texture_2d<f32>, s: sampler, at: vec2f) -> f32 { return sampled(o, s, at) + inner(t, s, at); }\n",
     )];
     let bindings = |call: &str| {
         let name = &call[..call.find('(').unwrap()];
         let body = format!(
-            "#import t::m::{{{name}}}\n@group(1) @binding(0) var t: texture_2d<f32>;\n@group(1) @binding(1) var s: sampler;\nfn value(k: u32) -> f32 {{ return {call}; }}"
+            "#import t::m::{{{name}}}\n@group(1) @binding(0) var t: texture_2d<f32>;\n@group(1) @binding(1) var s: sampler;\n@group(1) @binding(2) var other: texture_2d<f32>;\nfn value(k: u32) -> f32 {{ return {call}; }}"
         );
         let composed = compose(&modules, &compute(&body), Capabilities::empty(), &[]);
         let composed = composed.unwrap_or_else(|diags| panic!("{diags}"));
@@ -334,6 +335,8 @@ fn gathers_do_not_filter() {
     for (call, filters) in [
         ("gathered(t, s, vec2f(f32(k)))", false),
         ("sampled(t, s, vec2f(f32(k)))", true),
+        // What is only gathered, with a sampler that filters something else.
+        ("beside(other, t, s, vec2f(f32(k)))", true),
     ] {
         let (texture, sampler) = bindings(call);
         assert!(
