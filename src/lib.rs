@@ -19,6 +19,7 @@ pub mod program;
 #[cfg(feature = "reference")]
 pub mod reference;
 pub mod settings;
+pub mod temporal;
 pub mod terrain;
 pub mod view;
 

@@ -41,3 +41,29 @@ pub fn bayer_8x8(pixel: [u32; 2]) -> f64 {
 pub fn dither(encoded: [f64; 3], pixel: [u32; 2], levels: f64) -> [f64; 3] {
     encoded.map(|c| c + (bayer_8x8(pixel) - 0.5) / levels)
 }
+
+/// Weights of four neighbours in a row for a place `x` between the second and the third, by Keys's kernel with a = -1/2.
+pub fn catmull_rom(x: f64) -> [f64; 4] {
+    [x + 1.0, x, 1.0 - x, 2.0 - x].map(|d| {
+        if d < 1.0 {
+            (1.5 * d - 2.5) * d * d + 1.0
+        } else if d < 2.0 {
+            ((-0.5 * d + 2.5) * d - 4.0) * d + 2.0
+        } else {
+            0.0
+        }
+    })
+}
+
+/// How much a sample counts for a pixel whose middle is `x` pixels away.
+pub fn pixel_share(x: f64) -> f64 {
+    ((0.6 - x.abs()) / 0.2).clamp(0.0, 1.0)
+}
+
+/// Factor that brings a difference into a box of `bound` standard deviations a side.
+pub fn box_share(difference: [f64; 3], deviation: [f64; 3], bound: f64) -> f64 {
+    let most = (0..3)
+        .map(|k| difference[k].abs() / (bound * deviation[k] + 1e-6))
+        .fold(1.0, f64::max);
+    1.0 / most
+}

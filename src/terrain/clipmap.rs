@@ -581,7 +581,14 @@ impl Clipmap {
         let [from, extent] = gaze.azimuths;
         let first = (from / width).floor() as i32 - 1;
         let count = ((extent / width).ceil() as i32 + 3).min(self.sectors[0]);
-        self.sectors = [self.sectors[0], first.rem_euclid(self.sectors[0]), count];
+        // A view that is shifted by less than a pixel keeps the sectors that it has.
+        let [all, made, made_count] = self.sectors;
+        let before = (first - made).rem_euclid(all);
+        if before + count > made_count || count + 6 < made_count {
+            self.sectors[1] = (first - 1).rem_euclid(all);
+            self.sectors[2] = (count + 2).min(all);
+        }
+        let count = self.sectors[2];
         let scale = gaze
             .near
             .max(4.0 * self.spacing * (self.first as f64).exp2());

@@ -27,6 +27,7 @@ mod simplex;
 mod sky;
 mod sweep;
 mod tables;
+mod temporal;
 mod terrain;
 mod tone_map;
 mod validators;

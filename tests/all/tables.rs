@@ -969,7 +969,7 @@ fn slices_and_distances_come_back() {
 }
 
 /// A half-precision number.
-fn half(bits: u16) -> f64 {
+pub fn half(bits: u16) -> f64 {
     let (exponent, digits) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
     let magnitude = match exponent {
         0 => digits * 2_f64.powi(-24),

@@ -2,6 +2,7 @@
 
 use serde_json::json;
 use veduta::glam::Vec3;
+use veduta::temporal::{Temporal, TemporalOptions};
 use veduta::terrain::{
     HitErrors, Land, RayPath, Terrain, TerrainLights, TerrainOptions, TerrainRay, hit_errors,
     ray_hits,
@@ -26,6 +27,9 @@ const SAMPLES: u32 = 8;
 /// Speed of the flight (m/s), and its frames a second.
 const FLIGHT: (f64, f64) = (100.0, 30.0);
 
+/// Frames that are joined before an eye that stands is judged, and those of the flight.
+const FRAMES: [usize; 2] = [32, 30];
+
 /// What is measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
@@ -40,16 +44,22 @@ pub struct Plan {
 /// Of one preset on one view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// Milliseconds of a draw, by round.
+    /// Milliseconds of a draw of all pixels, by round.
+    pub alone: Vec<f64>,
+    /// That picture against its own converged one (dB).
+    pub alone_psnr: f64,
+    /// Milliseconds of a draw of fewer pixels and of joining frames, by round.
     pub draws: Vec<f64>,
     /// The first bake (ms).
     pub first_bake: f64,
     /// Bakes in a flight, by frame (ms).
     pub bakes: Vec<f64>,
-    /// Draws in that flight (ms).
+    /// Draws and joins in that flight (ms).
     pub flown: Vec<f64>,
-    /// Against its own converged picture (dB).
+    /// Joined frames of an eye that stands against the converged picture (dB).
     pub psnr: f64,
+    /// The last frame of the flight against its converged picture (dB).
+    pub flown_psnr: f64,
 }
 
 /// Of one view.
@@ -95,9 +105,29 @@ struct Drawer {
     color: wgpu::Texture,
     depth: wgpu::TextureView,
     size: Size,
+    /// Joins frames, for presets that have fewer pixels than the picture.
+    temporal: Option<Temporal>,
 }
 
 impl Drawer {
+    /// One that joins frames to a picture of this size.
+    fn joining(bench: &Bench, preset: &str, size: Size, texels: u32) -> Result<Drawer, CliError> {
+        let taken = taken(preset, size);
+        let mut drawer = Drawer::new(bench, preset, taken, texels)?;
+        let options = TemporalOptions {
+            taken: [taken.width, taken.height],
+            size: [size.width, size.height],
+            bound: f32::INFINITY,
+            sharp: preset != "low",
+            ..TemporalOptions::of([size.width, size.height])
+        };
+        let mut temporal = Temporal::new(&bench.gpu.device, veduta::programs(), &options)?;
+        let color = drawer.color.create_view(&Default::default());
+        temporal.set_host(&bench.gpu.device, &color, &drawer.depth)?;
+        drawer.temporal = Some(temporal);
+        Ok(drawer)
+    }
+
     fn new(bench: &Bench, preset: &str, size: Size, texels: u32) -> Result<Drawer, CliError> {
         let device = &bench.gpu.device;
         let format = wgpu::TextureFormat::Rgba32Float;
@@ -125,11 +155,13 @@ impl Drawer {
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
                 format: wgpu::TextureFormat::Depth32Float,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                    | wgpu::TextureUsages::TEXTURE_BINDING,
                 view_formats: &[],
             })
             .create_view(&Default::default());
         Ok(Drawer {
+            temporal: None,
             terrain: Terrain::new(device, veduta::programs(), &targets, &options)?,
             color: picture(device, size, format),
             depth,
@@ -155,14 +187,19 @@ impl Drawer {
         }
     }
 
-    /// Milliseconds of baking and of drawing.
-    fn frame(&mut self, bench: &Bench, view: &View) -> Result<[f64; 2], CliError> {
+    /// Milliseconds of baking, of drawing and of joining.
+    fn frame(&mut self, bench: &Bench, view: &View) -> Result<[f64; 3], CliError> {
         let (device, queue) = (&bench.gpu.device, &bench.gpu.queue);
+        let unshifted = view;
+        let (view, rows) = match &self.temporal {
+            Some(t) => (&t.shifted(view), t.footprint_rows()),
+            None => (view, self.size.height),
+        };
         let lights = TerrainLights::clear(view.sun.irradiance);
         let mut encoder = device.create_command_encoder(&Default::default());
         let _ = self
             .terrain
-            .prepare(queue, &mut encoder, view, &lights, self.size.height)?;
+            .prepare(queue, &mut encoder, view, &lights, rows)?;
         let baked = Drawer::submit(bench, encoder)?;
         let mut encoder = device.create_command_encoder(&Default::default());
         {
@@ -186,24 +223,55 @@ impl Drawer {
             });
             let _ = self.terrain.draw_opaque(&mut pass);
         }
-        Ok([baked, Drawer::submit(bench, encoder)?])
+        let drawn = Drawer::submit(bench, encoder)?;
+        let Some(temporal) = &mut self.temporal else {
+            return Ok([baked, drawn, 0.0]);
+        };
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let _ = temporal.resolve(queue, &mut encoder, unshifted)?;
+        Ok([baked, drawn, Drawer::submit(bench, encoder)?])
     }
 
-    /// The picture drawn last: radiance, and the share of it that is ground.
+    /// The picture drawn or joined last: radiance, and the share of it that is ground.
     fn read(&self, bench: &Bench) -> Result<(Picture, f64), CliError> {
-        let bytes = bench.gpu.read_texture(&self.color)?;
-        let numbers: Vec<f32> = bytes
-            .chunks_exact(4)
-            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-            .collect();
+        let numbers: Vec<f32> = match &self.temporal {
+            Some(temporal) => bench
+                .gpu
+                .read_texture(temporal.result().texture())?
+                .chunks_exact(2)
+                .map(|b| half(u16::from_le_bytes([b[0], b[1]])))
+                .collect(),
+            None => bench
+                .gpu
+                .read_texture(&self.color)?
+                .chunks_exact(4)
+                .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+                .collect(),
+        };
+        let size = match &self.temporal {
+            Some(temporal) => {
+                let texture = temporal.result().texture();
+                [texture.width(), texture.height()]
+            }
+            None => [self.size.width, self.size.height],
+        };
         let ground = numbers.chunks_exact(4).filter(|p| p[3] > 0.0).count();
         let rgb = numbers
             .chunks_exact(4)
             .flat_map(|p| [p[0], p[1], p[2]])
             .collect();
-        let (width, height) = (self.size.width as usize, self.size.height as usize);
+        let [width, height] = size.map(|n| n as usize);
         let picture = Picture::new(width, height, rgb)?;
         Ok((picture, ground as f64 / (width * height) as f64))
+    }
+}
+
+/// A half-precision number without sign.
+fn half(bits: u16) -> f32 {
+    let (exponent, digits) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023));
+    match exponent {
+        0 => digits * 2_f32.powi(-24),
+        _ => (1.0 + digits / 1024.0) * 2_f32.powi(exponent - 15),
     }
 }
 
@@ -215,6 +283,16 @@ fn thesis(bench: &Bench, view: &str) -> Result<Job, CliError> {
         view,
         &[("ATMOSPHERE", Value::Flag(false))],
     )
+}
+
+/// The picture that a preset draws for one of this size.
+fn taken(preset: &str, size: Size) -> Size {
+    let ratio = if preset == "low" { 2.0 } else { 1.5 };
+    let less = |n: u32| (f64::from(n) / ratio).round() as u32;
+    Size {
+        width: less(size.width),
+        height: less(size.height),
+    }
 }
 
 fn larger(size: Size, by: u32) -> Size {
@@ -262,38 +340,52 @@ fn line(bench: &Bench, name: &str, plan: &Plan) -> Result<Line, CliError> {
     let mut presets = Vec::new();
     let mut ground = 0.0;
     for preset in PRESETS {
-        // The converged picture has the finest heights there are, and the rock of its preset.
+        // The converged pictures have the finest heights there are, and the rock of their preset.
         let mut fine = Drawer::new(bench, preset, larger(bench.size, SAMPLES), 1024)?;
-        fine.frame(bench, &view)?;
-        let converged = fine.read(bench)?.0.averaged(SAMPLES as usize)?;
+        let mut converged = Vec::new();
+        for view in [view, flown(&view, FRAMES[1])] {
+            fine.frame(bench, &view)?;
+            converged.push(shown(&fine.read(bench)?.0.averaged(SAMPLES as usize)?));
+        }
         drop(fine);
-        let mut drawer = Drawer::new(bench, preset, bench.size, 0)?;
-        let first_bake = drawer.frame(bench, &view)?[0];
-        let (own, share) = drawer.read(bench)?;
+        let mut alone = Drawer::new(bench, preset, bench.size, 0)?;
+        alone.frame(bench, &view)?;
+        let (own, share) = alone.read(bench)?;
         ground = share;
-        presets.push(Entry {
+        let mut entry = Entry {
+            alone: Vec::new(),
+            alone_psnr: psnr(&shown(&own), &converged[0]),
             draws: Vec::new(),
-            first_bake,
+            first_bake: 0.0,
             bakes: Vec::new(),
             flown: Vec::new(),
-            psnr: psnr(&shown(&own), &shown(&converged)),
-        });
-        drawers.push(drawer);
+            psnr: 0.0,
+            flown_psnr: 0.0,
+        };
+        let mut joining = Drawer::joining(bench, preset, bench.size, 0)?;
+        entry.first_bake = joining.frame(bench, &view)?[0];
+        for _ in 1..FRAMES[0] {
+            joining.frame(bench, &view)?;
+        }
+        entry.psnr = psnr(&shown(&joining.read(bench)?.0), &converged[0]);
+        for frame in 1..=FRAMES[1] {
+            let [baked, drawn, joined] = joining.frame(bench, &flown(&view, frame))?;
+            entry.bakes.push(baked);
+            entry.flown.push(drawn + joined);
+        }
+        entry.flown_psnr = psnr(&shown(&joining.read(bench)?.0), &converged[1]);
+        presets.push(entry);
+        drawers.push([alone, joining]);
     }
     let mut times = Vec::new();
     for _ in 0..plan.rounds {
         let cost = renderer.draw(&view, Tiling::Adaptive, &mut |_| {})?;
         times.push(cost.cpu_ms.unwrap_or(f64::NAN));
-        for (drawer, entry) in drawers.iter_mut().zip(&mut presets) {
-            drawer.frame(bench, &view)?;
-            entry.draws.push(drawer.frame(bench, &view)?[1]);
-        }
-    }
-    for (drawer, entry) in drawers.iter_mut().zip(&mut presets) {
-        for frame in 1..=30 {
-            let [baked, drawn] = drawer.frame(bench, &flown(&view, frame))?;
-            entry.bakes.push(baked);
-            entry.flown.push(drawn);
+        for ([alone, joining], entry) in drawers.iter_mut().zip(&mut presets) {
+            entry.alone.push(alone.frame(bench, &view)?[1]);
+            joining.frame(bench, &view)?;
+            let [_, drawn, joined] = joining.frame(bench, &view)?;
+            entry.draws.push(drawn + joined);
         }
     }
     // Half as many pixels a side: the reference takes long.
@@ -392,7 +484,7 @@ fn flicker(bench: &Bench, frames: usize) -> Result<Flicker, CliError> {
     for preset in PRESETS {
         // As fine for its pixels as it is by default for those of the size that is measured.
         let texels = if preset == "low" { 128 } else { 256 };
-        let mut once = Drawer::new(bench, preset, small, texels)?;
+        let mut once = Drawer::joining(bench, preset, small, texels)?;
         let mut fine = Drawer::new(bench, preset, larger(small, samples), 1024)?;
         let mut shown = Vec::new();
         for frame in 0..frames {
@@ -464,17 +556,19 @@ fn average(values: &[f64]) -> f64 {
 /// The report as a document.
 pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
     let mut rows = vec![
-        ["View", "ground", "`thesis` [ms]", "[dB]"]
+        ["View", "ground", "`thesis` [ms]"]
             .map(str::to_owned)
             .to_vec(),
     ];
+    let mut sharpness = vec![["View", "`thesis` [dB]"].map(str::to_owned).to_vec()];
     for preset in PRESETS {
-        for head in ["[ms]", "/ thesis", "flight [ms]", "baked", "[dB]"] {
-            rows[0].push(if head == "[ms]" {
-                format!("`{preset}` [ms]")
-            } else {
-                head.to_owned()
-            });
+        rows[0].push(format!("`{preset}` [ms]"));
+        for head in ["/ thesis", "flight [ms]", "baked", "alone"] {
+            rows[0].push(head.to_owned());
+        }
+        sharpness[0].push(format!("`{preset}` [dB]"));
+        for head in ["flight", "alone"] {
+            sharpness[0].push(head.to_owned());
         }
     }
     for l in &report.lines {
@@ -482,41 +576,54 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
             l.view.clone(),
             format!("{:.0} %", 100.0 * l.ground),
             format!("{:.1}", middle(&l.thesis)),
-            format!("{:.1}", l.thesis_psnr),
         ];
+        let mut sharp = vec![l.view.clone(), format!("{:.1}", l.thesis_psnr)];
         for p in &l.presets {
             row.push(format!("{:.1}", middle(&p.draws)));
             row.push(Ratio::of(&p.draws, &l.thesis).to_string());
             row.push(format!("{:.1}", average(&p.flown)));
             row.push(format!("{:.1}", average(&p.bakes)));
-            row.push(format!("{:.1}", p.psnr));
+            row.push(format!("{:.1}", middle(&p.alone)));
+            for psnr in [p.psnr, p.flown_psnr, p.alone_psnr] {
+                sharp.push(format!("{psnr:.1}"));
+            }
         }
         rows.push(row);
+        sharpness.push(sharp);
     }
-    let mut row = vec![
+    let thesis = mean(report, &|l| middle(&l.thesis));
+    let mut row = vec!["mean".to_owned(), String::new(), format!("{thesis:.1}")];
+    let mut sharp = vec![
         "mean".to_owned(),
-        String::new(),
-        format!("{:.1}", mean(report, &|l| middle(&l.thesis))),
         format!("{:.1}", mean(report, &|l| l.thesis_psnr)),
     ];
     for k in 0..PRESETS.len() {
         let draw = mean(report, &|l| middle(&l.presets[k].draws));
         row.push(format!("{draw:.1}"));
-        row.push(format!(
-            "{:.3}",
-            draw / mean(report, &|l| middle(&l.thesis))
-        ));
-        row.push(format!(
-            "{:.1}",
-            mean(report, &|l| average(&l.presets[k].flown))
-        ));
-        row.push(format!(
-            "{:.1}",
-            mean(report, &|l| average(&l.presets[k].bakes))
-        ));
-        row.push(format!("{:.1}", mean(report, &|l| l.presets[k].psnr)));
+        row.push(format!("{:.3}", draw / thesis));
+        let of: [&dyn Fn(&Entry) -> f64; 3] =
+            [&|p| average(&p.flown), &|p| average(&p.bakes), &|p| {
+                middle(&p.alone)
+            }];
+        for of in of {
+            row.push(format!("{:.1}", mean(report, &|l| of(&l.presets[k]))));
+        }
+        let of: [&dyn Fn(&Entry) -> f64; 3] = [&|p| p.psnr, &|p| p.flown_psnr, &|p| p.alone_psnr];
+        for of in of {
+            sharp.push(format!("{:.1}", mean(report, &|l| of(&l.presets[k]))));
+        }
     }
     rows.push(row);
+    sharpness.push(sharp);
+    let whole: Vec<String> = PRESETS
+        .iter()
+        .enumerate()
+        .map(|(k, preset)| {
+            let of = |p: &Entry| average(&p.flown) + average(&p.bakes);
+            let all = mean(report, &|l| of(&l.presets[k]));
+            format!("`{preset}` {:.3}", all / thesis)
+        })
+        .collect();
     let mut hits = vec![
         [
             "View",
@@ -572,13 +679,20 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
         .collect();
     format!(
         "# What the terrain costs and how far it is off\n\nWritten by `{command}`.\n\n{}\n\
-         The mountains of the preset `thesis` alone, without air or clouds, and the land `thesis` with its lights. Milliseconds are those of a draw (median)\n\
-         and, in a flight at 100 m/s with 30 frames a second, of a draw and of baking (means). PSNR is that of each against itself with {SAMPLES} x {SAMPLES} samples a\n\
-         pixel. The last line is the mean over the views that show ground. The first bake and the memory: {}.\n\n{}\n\
+         The mountains of the preset `thesis` alone, without air or clouds, and the land `thesis` with its lights. Presets draw fewer pixels than the picture has, `high` two\n\
+         thirds and `low` half of them a side, and `Temporal` joins the frames; `alone` draws all pixels and joins nothing. Milliseconds are those of a draw with joining\n\
+         (median) and, in a flight at 100 m/s with 30 frames a second, of a draw with joining and of baking (means). Flights with bakes over `thesis`, means: {}.\n\
+         The first bake and the memory of heights: {}.\n\n{}\n\
+         ## Against many samples\n\nPSNR of each against itself with {SAMPLES} x {SAMPLES} samples a pixel: of `thesis`, of an eye that stands after {} frames, of the last of {} frames of the\n\
+         flight, and of one frame of all pixels alone. The last line is the mean over the views that show ground.\n\n{}\n\
          ## Hits\n\nRays of half as many pixels a side, as `high` follows them, against bracketing in f64; errors across the ray in footprints.\n\n{}{flight}",
         bench.machine(),
+        whole.join(", "),
         bakes.join(", "),
         table(&rows),
+        FRAMES[0],
+        FRAMES[1],
+        table(&sharpness),
         table(&hits),
     )
 }
@@ -597,11 +711,14 @@ pub fn to_json(bench: &Bench, report: &Report, command: &str) -> serde_json::Val
                 "thesis_psnr": l.thesis_psnr,
                 "presets": PRESETS.iter().zip(&l.presets).map(|(name, p)| json!({
                     "preset": name,
+                    "alone": p.alone,
+                    "alone_psnr": p.alone_psnr,
                     "draws": p.draws,
                     "first_bake": p.first_bake,
                     "flight_draw": average(&p.flown),
                     "flight_bake": average(&p.bakes),
                     "psnr": p.psnr,
+                    "flight_psnr": p.flown_psnr,
                 })).collect::<Vec<_>>(),
                 "hits": {
                     "rays": l.hits.rays,

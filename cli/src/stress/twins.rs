@@ -1213,6 +1213,15 @@ pub fn registry() -> Vec<Entry> {
     same!(list, "post::srgb", "post", post, encode_srgb, decode_srgb);
     same!(
         list,
+        "post::temporal",
+        "post",
+        post,
+        catmull_rom,
+        pixel_share,
+        box_share
+    );
+    same!(
+        list,
         "tone_map::aces",
         "tone_map",
         tone_map,
