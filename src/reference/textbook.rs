@@ -40,9 +40,11 @@ fn rising(air: &Atmosphere, h: f64, mu: f64, size: f64, steps: i32) -> [f64; MOS
     sum
 }
 
-/// Optical depth from altitude `h` to the sun at the zenith cosine `sun_mu`; a sun below the horizon counts as just above.
+/// Optical depth from altitude `h` to the sun at the zenith cosine `sun_mu`; a sun below the horizon counts as just above, one within 1e-12 of level as
+/// level.
 pub fn march_sun_depth(air: &Atmosphere, h: f64, sun_mu: f64, steps: i32) -> [f64; 3] {
     let (radius, steps) = (air.planet_radius, steps.max(1));
+    let sun_mu = if sun_mu.abs() < 1e-12 { 0.0 } else { sun_mu };
     let path = path_to_top(radius, air.thickness, h, sun_mu);
     let rise = rising(air, path.lowest, sun_mu.max(0.0), path.rises, steps);
     let fall = rising(air, path.lowest, 0.0, path.falls, steps);

@@ -13,7 +13,7 @@ const PI: f32 = 3.14159265;
 /// domain  angular_radius in [1e-3, 0.1] rad log
 /// domain  pixel_angle in [1e-4, 0.1] rad log
 /// range   [0, 4e5] 1/sr
-/// error   20 abs of reference::atmosphere::sun_disc
+/// error   13.5 abs of reference::atmosphere::sun_disc
 /// outside undefined
 /// source  chord distance to the disc's centre; area of the ramp in closed form
 fn sun_disc(dir: vec3<f32>, to_sun: vec3<f32>, angular_radius: f32, pixel_angle: f32) -> f32 {

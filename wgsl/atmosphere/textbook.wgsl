@@ -37,7 +37,7 @@ fn rising_step(air: Air, h: f32, mu: f32, near: f32, far: f32) -> Lanes {
 }
 
 /// Optical depth from a lit place in the air at altitude `h` to the sun at the zenith cosine `sun_mu`, per channel; the steps
-/// grow with the square of the distance from the lowest point. A sun below the horizon is taken as just above it.
+/// grow with the square of the distance from the lowest point. A sun below the horizon is taken as just above it, one within 1e-12 of level as level.
 ///
 /// domain  h in [0, 1e5] m lin
 /// domain  sun_mu in [-1, 1] 1 lin
@@ -49,8 +49,9 @@ fn rising_step(air: Air, h: f32, mu: f32, near: f32, far: f32) -> Lanes {
 fn march_sun_depth(air: Air, h: f32, sun_mu: f32, steps: i32) -> vec3<f32> {
     let radius = air.ground_radius;
     // The path first falls to its lowest point, if the sun stands below the level, and then rises to the top.
-    let path = path_to_top(radius, air.top, h, sun_mu);
-    let mu = max(sun_mu, 0.0);
+    let level = abs(sun_mu) < 1e-12;
+    let path = path_to_top(radius, air.top, h, select(sun_mu, 0.0, level));
+    let mu = select(max(sun_mu, 0.0), 0.0, level);
     let share = 1.0 / f32(max(steps, 1));
     var column = Lanes(vec4<f32>(0.0), vec4<f32>(0.0));
     for (var i = 0; i < max(steps, 1); i++) {

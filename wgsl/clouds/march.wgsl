@@ -73,7 +73,7 @@ fn sun_depth(layer: CloudLayer, ground_radius: f32, relative: vec3<f32>, altitud
 /// domain  steps in [1, 512] 1 lin
 /// domain  light_steps in [1, 64] 1 lin
 /// domain  jitter in [0, 1] 1 lin
-/// range   [0, 100] 1/sr
+/// range   [0, 1e6] 1/sr
 /// error   3e-4 abs of reference::clouds::march_clouds
 /// outside undefined
 /// source  Leitner2022 ch. 4.5 and eq. 3.14
@@ -120,7 +120,7 @@ fn march_clouds(layer: CloudLayer, ground_radius: f32, eye_altitude: f32, dir: v
 /// domain  light_steps in [1, 64] 1 lin
 /// domain  min_transmittance in [0, 0.1] 1 lin
 /// domain  jitter in [0, 1] 1 lin
-/// range   [0, 100] 1/sr
+/// range   [0, 1e6] 1/sr
 /// error   3e-4 abs of reference::clouds::march_clouds
 /// outside undefined
 /// source  Leitner2022 ch. 4.5 and eq. 3.14; skipping: ours

@@ -300,7 +300,7 @@ fn own_sum(field: Field, offset: vec2<f32>, footprint: f32) -> Ground {
 /// domain  offset in [-1e5, 1e5] m lin
 /// domain  footprint in [1e-3, 1e5] m log
 /// range   [-1e5, 1e5] 1
-/// error   3e-2 abs of reference::field::ground
+/// error   0.1 abs of reference::field::ground
 /// outside undefined
 /// source  Leitner2022 alg. 1 to 3; the filter: ours
 fn ground_at(field: Field, kind: i32, offset: vec2<f32>, footprint: f32) -> Ground {

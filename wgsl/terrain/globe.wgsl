@@ -261,7 +261,7 @@ fn globe_octaves(globe: Globe, kind: i32, cell: vec3<i32>, frac: vec3<f32>, up: 
 /// domain  up in [-1, 1] 1 lin
 /// domain  footprint in [1e-3, 1e5] m log
 /// range   [-1e5, 1e5] 1
-/// error   8e-3 abs of reference::globe::ground
+/// error   5e-3 abs of reference::globe::ground
 /// outside undefined
 /// source  Leitner2022 alg. 1 to 3; the filter and the ball: ours
 fn globe_ground(globe: Globe, kind: i32, cell: vec3<i32>, frac: vec3<f32>, up: vec3<f32>, footprint: f32) -> GlobeGround {
@@ -282,7 +282,7 @@ fn globe_frac(globe: Globe, at: vec3<f32>, altitude: f32) -> vec3<f32> {
 /// domain  at in [-2e5, 2e5] m lin
 /// domain  footprint in [1e-3, 1e5] m log
 /// range   [-1e5, 1e5] 1
-/// error   1 abs of reference::globe::ground_from
+/// error   0.2 abs of reference::globe::ground_from
 /// outside undefined
 /// source  the place on the ball from the eye's without a difference of radii: ours
 fn globe_at(globe: Globe, kind: i32, at: vec3<f32>, footprint: f32) -> GlobeGround {

@@ -28,7 +28,7 @@ struct RefinedHit {
 /// domain  most in [0, 1e4] m lin
 /// domain  steps in [0, 4] 1 lin
 /// range   [-1e5, 2e5] 1
-/// error   1 abs of reference::field::refined
+/// error   0.8 abs of reference::field::refined
 /// outside undefined
 /// source  Newton's method
 fn refined_hit(field: Field, kind: i32, ground_radius: f32, eye_altitude: f32, origin: vec3<f32>, dir: vec3<f32>, t: f32, pixel_angle: f32, most: f32, steps: i32) -> RefinedHit {

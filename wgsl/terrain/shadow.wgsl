@@ -32,6 +32,7 @@ struct TerrainShadow {
 /// domain  octaves in [1, 16] 1 lin
 /// range   [0, 1] 1
 /// error   2e-3 abs of reference::terrain::soft_shadow
+/// outside undefined
 /// source  Leitner2022 ch. 4.2.5; departs: clearance over distance in place of the bare clearance, which near the
 ///         surface is small on every ray
 fn soft_shadow(terrain: Terrain, ground_radius: f32, eye_altitude: f32, relative: vec3<f32>, normal: vec3<f32>,

@@ -2135,6 +2135,8 @@ fn particular(entry: Entry) -> Entry {
                 .unit("to_sun")
                 .lin("steps", 1.0, 32.0)
                 .lin("light_steps", 1.0, 8.0)
+                // A sample on the layer's border is inside or outside by its rounding.
+                .lin("jitter", 0.01, 0.99)
                 .judged(judged)
                 .jumps(
                     "tangent rays, samples at the border of the planet's shadow",
