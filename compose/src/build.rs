@@ -71,7 +71,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             return vec![BTreeSet::new(), BTreeSet::from([flag.to_owned()])];
         }
         "cloud_volume" => {
-            let ways: [&[&str]; 7] = [
+            let ways: [&[&str]; 12] = [
                 &[],
                 &["CLOUD_READS_NODES"],
                 &["CLOUD_NODES"],
@@ -79,6 +79,11 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 &["CLOUD_SWEEP"],
                 &["CLOUD_GATHER"],
                 &["CLOUD_GATHER", "CLOUD_PROLONG"],
+                &["CLOUD_LAYERED"],
+                &["CLOUD_LAYERED", "CLOUD_CELLS"],
+                &["CLOUD_LAYERED", "CLOUD_SWEEP"],
+                &["CLOUD_LAYERED", "CLOUD_GATHER"],
+                &["CLOUD_LAYERED", "CLOUD_GATHER", "CLOUD_PROLONG"],
             ];
             let set = |flags: &&[&str]| flags.iter().map(|f| (*f).to_owned()).collect();
             return ways.iter().map(set).collect();

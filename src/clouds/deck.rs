@@ -122,6 +122,12 @@ impl CloudDeck {
         self.wavelength * f64::from(self.period_doublings.min(31)).exp2()
     }
 
+    /// Way without clouds for each unit that the density before its cut is below 0 (m): the noise seldom rises by more than its whole range over half a
+    /// wavelength of the first octave.
+    pub(super) fn clear_way(&self) -> f64 {
+        0.5 * self.coverage * self.wavelength / (1.0 - self.uniformity).max(0.01)
+    }
+
     /// Whether there is nothing to see of it.
     pub fn is_empty(&self) -> bool {
         self.thickness <= 0.0 || self.coverage <= 0.0 || self.extinction <= 0.0

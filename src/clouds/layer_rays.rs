@@ -1,7 +1,8 @@
 //! Light of a layer of clouds alone along given rays: a query.
 
+use super::layer_orders::{LayerOrders, Lighting};
 use super::tile::{LOWEST_SUN, Tile, slant};
-use super::{CloudDeck, CubeLight, ProbePath};
+use super::{CloudDeck, CubeLight, Orders, ProbePath, fault};
 use crate::atmosphere::ProbeRay;
 use crate::device::Gpu;
 use crate::error::Error;
@@ -9,20 +10,71 @@ use crate::exchange::{Exchange, compute};
 use crate::program::ProgramSet;
 use crate::programs::blocks::LayerProbe as ProbeBlock;
 
-/// Light that a layer scatters once into rays, for a sun of irradiance 1 without air and without light from the ground, and its transmittance: marched
-/// through the noise, or on the path `Fast` from a tile of 512 x 512 x 64. Rays end at the ground. Submits and waits; a tile is baked for each sun.
-/// Where the sun is lower than a tile may be baked for (see [`LOWEST_SUN`]) rays are marched.
+/// How the light of a layer is found, and what lights it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LayerOptions {
+    /// For light that is scattered once: `Textbook` marches through the noise and to the sun from every sample, `Fast` reads a tile. Light of all orders is
+    /// found from the tile on both, `Textbook` with steps a fourth as long.
+    pub path: ProbePath,
+    /// Which orders of scattering.
+    pub orders: Orders,
+    /// Irradiance of the sun across its rays, at least 0.
+    pub sun: f32,
+    /// Radiance that comes to the layer from every direction above, and from every one below, at least 0; needs all orders.
+    pub around: [f32; 2],
+}
+
+impl Default for LayerOptions {
+    /// All orders of the sun's light, along the fast path.
+    fn default() -> Self {
+        LayerOptions {
+            path: ProbePath::Fast,
+            orders: Orders::All,
+            sun: 1.0,
+            around: [0.0; 2],
+        }
+    }
+}
+
+/// Light that a layer scatters into rays, without air, and its transmittance. Rays end at the ground, which is black but for the radiance that comes from
+/// below. Submits and waits; a tile of 512 x 512 x 64 is baked for each sun where one is read.
+///
+/// Light of all orders is that of a layer over a plane that repeats, without the planet's curvature, swept over cells as in [`super::cube_light`]; what light
+/// from above and from below shows of itself behind the clouds is not counted. The sun's depths are those of a sun that is at least as high as
+/// [`LOWEST_SUN`]; where it is lower, rays of single scattering are marched on both paths.
 ///
 /// # Errors
-/// As [`CloudDeck::check`]; the faults of making pipelines; [`Error::Device`].
+/// As [`CloudDeck::check`]; [`Error::OutOfDomain`] for options; the faults of making pipelines; [`Error::Device`].
 pub fn layer_light(
     gpu: &Gpu,
     programs: &ProgramSet,
     deck: &CloudDeck,
     rays: &[ProbeRay],
-    path: ProbePath,
+    options: &LayerOptions,
 ) -> Result<Vec<CubeLight>, Error> {
     deck.check()?;
+    for (name, value) in [
+        ("sun", options.sun),
+        ("around[0]", options.around[0]),
+        ("around[1]", options.around[1]),
+    ] {
+        if !(value >= 0.0 && value.is_finite()) {
+            return Err(fault(
+                &format!("options.{name}"),
+                value,
+                "finite and at least 0",
+            ));
+        }
+    }
+    let all = options.orders == Orders::All;
+    if !all && options.around != [0.0; 2] {
+        return Err(fault(
+            "options.around",
+            format!("{:?}", options.around),
+            "0 for single scattering",
+        ));
+    }
+    let path = options.path;
     let clear = CubeLight {
         scatter: 0.0,
         transmittance: 1.0,
@@ -39,6 +91,28 @@ pub fn layer_light(
         }
     }
     let (device, queue) = (&gpu.device, &gpu.queue);
+    if all {
+        let textbook = path == ProbePath::Textbook;
+        let shortest = deck.thickness / if textbook { 256.0 } else { 64.0 };
+        let solver = LayerOrders::new(gpu, programs, deck, 64, shortest)?;
+        let tile = Tile::new(device, programs, &[512], 64)?;
+        let lighting = Lighting {
+            sun: options.sun,
+            around: options.around,
+        };
+        for (to_sun, members) in &groups {
+            bake(gpu, &tile, deck, to_sun.map(|c| c as f32));
+            let moments = solver.solve(&tile, *to_sun, &lighting);
+            for part in members.chunks(1 << 12) {
+                let rows: Vec<ProbeRay> = part.iter().map(|i| rays[*i]).collect();
+                let found = solver.run(&tile, &moments, *to_sun, &lighting, &rows)?;
+                for (i, found) in part.iter().zip(found) {
+                    light[*i] = found;
+                }
+            }
+        }
+        return Ok(light);
+    }
     let marched = compute(device, programs, "cloud_probe", &[], &[])?;
     let mut baked = None;
     for (to_sun, members) in &groups {
@@ -50,11 +124,7 @@ pub fn layer_light(
         }
         let tile = baked.as_ref().filter(|_| fast);
         if let Some((tile, _)) = tile {
-            for part in 0..tile.parts(0) {
-                let mut encoder = device.create_command_encoder(&Default::default());
-                let _ = tile.bake(queue, &mut encoder, deck, sun, 0, part);
-                queue.submit([encoder.finish()]);
-            }
+            bake(gpu, tile, deck, sun);
         }
         let (pipeline, layouts) = tile.map_or(&marched, |(_, kernel)| kernel);
         for part in members.chunks(1 << 12) {
@@ -124,11 +194,19 @@ pub fn layer_light(
             let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
             for (i, row) in part.iter().zip(found.chunks_exact(8)) {
                 light[*i] = CubeLight {
-                    scatter: number(row),
+                    scatter: options.sun * number(row),
                     transmittance: number(&row[4..]),
                 };
             }
         }
     }
     Ok(light)
+}
+
+fn bake(gpu: &Gpu, tile: &Tile, deck: &CloudDeck, sun: [f32; 3]) {
+    for part in 0..tile.parts(0) {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let _ = tile.bake(&gpu.queue, &mut encoder, deck, sun, 0, part);
+        gpu.queue.submit([encoder.finish()]);
+    }
 }

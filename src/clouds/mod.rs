@@ -1,15 +1,18 @@
 //! Clouds: a layer over a host's picture, and the light along given rays as a query.
 
+mod air_lights;
 mod deck;
 mod directions;
+mod layer_orders;
 mod layer_rays;
 mod phase;
 mod system;
 mod tile;
 pub mod volume;
 
+pub use air_lights::AirLights;
 pub use deck::CloudDeck;
-pub use layer_rays::layer_light;
+pub use layer_rays::{LayerOptions, layer_light};
 pub use system::{CloudLights, CloudQuality, Clouds, CloudsOptions};
 pub use tile::LOWEST_SUN;
 pub use volume::{CubeLight, CubeOptions, CubeRay, DensityCube, cube_light};

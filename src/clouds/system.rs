@@ -39,7 +39,8 @@ pub struct CloudQuality {
     pub first_texels: u32,
     /// Levels of the tile, in [2, 256].
     pub levels: u32,
-    /// Steps along a ray, in [1, 4096].
+    /// Steps along a ray that is eight times as long in the layer as the layer is thick, in [1, 4096]: their number goes with the root of the length, up to
+    /// four times this.
     pub steps: u32,
     /// The march ends when less is left, in [0, 0.1].
     pub min_transmittance: f32,
@@ -473,6 +474,8 @@ impl Clouds {
             } else {
                 0.0
             },
+            clear: deck.clear_way() as f32,
+            ..Default::default()
         };
         let bytes = block.to_bytes().to_vec();
         if bytes != self.held {

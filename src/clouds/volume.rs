@@ -254,7 +254,7 @@ struct Solver<'a> {
     rays: Kernel,
 }
 
-type Kernel = (wgpu::ComputePipeline, Vec<wgpu::BindGroupLayout>);
+pub(super) type Kernel = (wgpu::ComputePipeline, Vec<wgpu::BindGroupLayout>);
 
 /// What holds for one sun.
 struct Prepared {
@@ -265,7 +265,7 @@ struct Prepared {
 
 /// Cells along an edge of each grid, with sweeps: light that goes far is found on coarse ones.
 const GRIDS: [(usize, usize); 3] = [(8, 96), (16, 40), (32, 24)];
-const WAY: usize = 112;
+pub(super) const WAY: usize = 112;
 
 impl<'a> Solver<'a> {
     fn new(
@@ -542,7 +542,7 @@ impl<'a> Solver<'a> {
     }
 }
 
-fn room(device: &wgpu::Device, size: usize, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+pub(super) fn room(device: &wgpu::Device, size: usize, usage: wgpu::BufferUsages) -> wgpu::Buffer {
     device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("veduta cube"),
         size: size as u64,
@@ -551,7 +551,7 @@ fn room(device: &wgpu::Device, size: usize, usage: wgpu::BufferUsages) -> wgpu::
     })
 }
 
-fn filled(gpu: &Gpu, bytes: &[u8]) -> wgpu::Buffer {
+pub(super) fn filled(gpu: &Gpu, bytes: &[u8]) -> wgpu::Buffer {
     let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
     let buffer = room(&gpu.device, bytes.len(), usage);
     gpu.queue.write_buffer(&buffer, 0, bytes);

@@ -67,6 +67,24 @@ pub fn cloud_density(layer: &CloudLayer, relative: [f64; 3], altitude: f64) -> f
     if altitude < layer.bottom || altitude > layer.bottom + layer.thickness {
         return 0.0;
     }
+    let n = noise(layer, relative, altitude);
+    shape_coverage(n, layer.coverage, layer.uniformity)
+}
+
+/// Density of the layer before its cut: below 0 where there is no cloud; not cut at the layer's spheres either.
+pub fn uncut_density(layer: &CloudLayer, relative: [f64; 3], altitude: f64) -> f64 {
+    let n = noise(layer, relative, altitude);
+    let filled = n + (1.0 - n) * layer.uniformity;
+    (filled - (1.0 - layer.coverage)) / layer.coverage.max(1e-6)
+}
+
+/// Mean of a density that changes evenly from one value to another, where what is below 0 is none.
+pub fn mean_density(here: f64, next: f64) -> f64 {
+    let full = here.max(0.0) + next.max(0.0);
+    0.5 * full * full / (here.abs() + next.abs()).max(1e-9)
+}
+
+fn noise(layer: &CloudLayer, relative: [f64; 3], altitude: f64) -> f64 {
     let place = add(
         layer.frac,
         scale([relative[0], altitude, relative[2]], 1.0 / layer.wavelength),
@@ -76,15 +94,14 @@ pub fn cloud_density(layer: &CloudLayer, relative: [f64; 3], altitude: f64) -> f
     } else {
         1 << 20
     };
-    let n = fbm_value_3d_periodic(
+    fbm_value_3d_periodic(
         layer.cell,
         place,
         [period; 3],
         layer.octaves,
         layer.hurst,
         layer.seed,
-    );
-    shape_coverage(n, layer.coverage, layer.uniformity)
+    )
 }
 
 /// Distance from a point within the layer to the layer's edge.

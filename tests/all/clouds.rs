@@ -482,6 +482,32 @@ fn cloud_functions_keep_their_promised_error() {
     assert_promise("clouds/field", "cloud_density", &values, &truth);
     let truth: Vec<f64> = list
         .iter()
+        .map(|r| clouds::uncut_density(&model, [r[0], r[1], r[2]], r[3]))
+        .collect();
+    let values = evaluator(
+        &["veduta::clouds::field::{CloudLayer, uncut_density}"],
+        LAYER,
+        "uncut_density(layer(0.6, 0.0, 0.06, 0.5), vec3f(in.f[0], in.f[1], in.f[2]), in.f[3])",
+        7,
+    )
+    .run(&device_rows)
+    .unwrap();
+    assert_promise("clouds/field", "uncut_density", &values, &truth);
+    let truth: Vec<f64> = list
+        .iter()
+        .map(|r| clouds::mean_density(r[4], r[5]))
+        .collect();
+    let values = evaluator(
+        &["veduta::clouds::integral::{mean_density}"],
+        "",
+        "mean_density(in.f[4], in.f[5])",
+        7,
+    )
+    .run(&device_rows)
+    .unwrap();
+    assert_promise("clouds/integral", "mean_density", &values, &truth);
+    let truth: Vec<f64> = list
+        .iter()
         .take(1000)
         .map(|r| {
             clouds::sun_depth(

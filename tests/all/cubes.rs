@@ -4,7 +4,7 @@ use crate::common::gpu;
 use veduta::atmosphere::ProbeRay;
 use veduta::clouds::{
     CloudDeck, CloudLights, CloudQuality, Clouds, CloudsOptions, CubeOptions, CubeRay, DensityCube,
-    Orders, ProbePath, cube_light, layer_light,
+    LayerOptions, Orders, ProbePath, cube_light, layer_light,
 };
 use veduta::glam::{DVec3, Vec3};
 use veduta::reference::monte_carlo::Random;
@@ -342,7 +342,18 @@ fn a_layer_from_its_tile_meets_the_march() {
         let truth = volume::layer_light(&deck, &rays, Orders::Single, &VolumePaths::default());
         let size = truth.iter().map(|t| t[0] * t[0]).sum::<f64>();
         for (path, bound) in [(ProbePath::Textbook, 0.02), (ProbePath::Fast, 0.06)] {
-            let found = layer_light(gpu(), veduta::programs(), &deck, &rays, path).unwrap();
+            let found = layer_light(
+                gpu(),
+                veduta::programs(),
+                &deck,
+                &rays,
+                &LayerOptions {
+                    path,
+                    orders: Orders::Single,
+                    ..Default::default()
+                },
+            )
+            .unwrap();
             let off: f64 = (0..rays.len())
                 .map(|i| (f64::from(found[i].scatter) - truth[i][0]).powi(2))
                 .sum();
@@ -355,6 +366,218 @@ fn a_layer_from_its_tile_meets_the_march() {
             assert!(through < 0.05, "{path:?} {through}");
         }
     }
+}
+
+#[test]
+fn light_of_all_orders_in_a_layer_meets_paths() {
+    let deck = CloudDeck {
+        period_doublings: 1,
+        extinction: 0.02,
+        ..CloudDeck::default()
+    };
+    let rays: Vec<ProbeRay> = layer_rays(direction(0.7, 0.4).to_array())
+        .into_iter()
+        .step_by(2)
+        .collect();
+    let paths = VolumePaths {
+        samples: 400,
+        ..Default::default()
+    };
+    let truth = volume::layer_light(&deck, &rays, Orders::All, &paths);
+    let options = LayerOptions::default();
+    let found = layer_light(gpu(), veduta::programs(), &deck, &rays, &options).unwrap();
+    let mean = |of: &dyn Fn(usize) -> f64| (0..rays.len()).map(of).sum::<f64>() / rays.len() as f64;
+    let wanted = mean(&|i| truth[i][0]);
+    let noise = mean(&|i| truth[i][1].powi(2)).sqrt() / (rays.len() as f64).sqrt() / wanted;
+    let off = mean(&|i| f64::from(found[i].scatter)) / wanted - 1.0;
+    println!("{off:.3}, noise {noise:.3}");
+    assert!(off.abs() < 0.08 + 2.0 * noise, "{off} {noise}");
+    let through = (0..rays.len())
+        .map(|i| (f64::from(found[i].transmittance) - truth[i][2]).abs())
+        .fold(0.0, f64::max);
+    assert!(through < 0.05, "{through}");
+    // White from all around stays white.
+    let white = LayerOptions {
+        sun: 0.0,
+        around: [1.0; 2],
+        ..options
+    };
+    for light in layer_light(gpu(), veduta::programs(), &deck, &rays, &white).unwrap() {
+        let sum = light.scatter + light.transmittance;
+        assert!((sum - 1.0).abs() < 3e-3, "{sum}");
+    }
+    let wrong = LayerOptions {
+        orders: Orders::Single,
+        ..white
+    };
+    let error = layer_light(gpu(), veduta::programs(), &deck, &rays, &wrong).unwrap_err();
+    assert!(error.to_string().contains("options.around"), "{error}");
+}
+
+#[test]
+fn a_layer_under_an_air_is_lit_by_it() {
+    let air = veduta::Atmosphere::default();
+    let deck = CloudDeck::default();
+    let lights = |height: f64| {
+        let sun = direction(height, 0.3).to_array();
+        veduta::clouds::AirLights::find(gpu(), &air, &deck, sun).unwrap()
+    };
+    let (noon, low, night) = (lights(1.2), lights(0.03), lights(-0.5));
+    // Red at sunset, blue from above at noon, the ground's share from below; nothing at night.
+    assert!(
+        noon.sun.min_element() > 0.7 && low.sun.x > 2.0 * low.sun.z,
+        "{noon:?} {low:?}"
+    );
+    assert!(noon.above.z > 1.5 * noon.above.x, "{noon:?}");
+    assert!(noon.below.x > noon.above.x, "{noon:?}");
+    assert_eq!(night.sun, Vec3::ZERO);
+    assert!(
+        night.above.max_element() < 1e-3 * noon.above.min_element(),
+        "{night:?}"
+    );
+}
+
+/// Wind of a time takes the clouds as far as the eye has moved: the picture is that of the query.
+#[test]
+fn clouds_with_wind_and_a_moved_eye_meet_the_query() {
+    let host = Host::new();
+    let options = CloudsOptions {
+        deck: CloudDeck {
+            wind: [20.0, -7.0],
+            ..CloudDeck::default()
+        },
+        quality: CloudQuality {
+            texels: 256,
+            first_texels: 256,
+            steps: 400,
+            ..CloudQuality::of(&Preset::High)
+        },
+        ..Default::default()
+    };
+    let mut clouds = Clouds::new(
+        &gpu().device,
+        veduta::programs(),
+        &Host::targets(),
+        &options,
+    )
+    .unwrap();
+    let mut view = looking(300.0, 0.9);
+    view.time = 3000.0;
+    view.eye = WorldPos::from_metres(DVec3::new(60_000.0, 300.0, -21_000.0));
+    view.sun.to_light = Vec3::new(0.48, 0.6, 0.64);
+    let (_, _, words) = host.frame(&mut clouds, &view);
+    let [middle, right, up] = view.rays().unwrap();
+    let mut rays = Vec::new();
+    for k in 0..Host::HEIGHT {
+        for i in 0..Host::WIDTH {
+            let at = |k: u32, n: u32| (2 * k + 1) as f32 / n as f32 - 1.0;
+            let ray = middle + at(i, Host::WIDTH) * right - at(k, Host::HEIGHT) * up;
+            rays.push(ProbeRay {
+                altitude: 300.0,
+                dir: ray.as_dvec3().normalize().to_array(),
+                to_sun: view.sun.to_light.as_dvec3().to_array(),
+                distance: f64::INFINITY,
+            });
+        }
+    }
+    let query = LayerOptions {
+        orders: Orders::Single,
+        ..Default::default()
+    };
+    let found = layer_light(gpu(), veduta::programs(), &options.deck, &rays, &query).unwrap();
+    let mut off = 0.0_f64;
+    for (pixel, light) in words.chunks(4).zip(&found) {
+        let left = f64::from(half(pixel[3]));
+        off += (left - f64::from(light.transmittance)).powi(2);
+    }
+    let rms = (off / rays.len() as f64).sqrt();
+    assert!(rms < 0.02, "{rms}");
+    let covered = found.iter().filter(|l| l.transmittance < 0.5).count();
+    assert!(
+        (rays.len() / 10..rays.len() * 9 / 10).contains(&covered),
+        "{covered}"
+    );
+}
+
+/// A depth buffer's wall before the clouds hides them, one behind does not, and one within cuts them.
+#[test]
+fn a_host_s_depth_ends_the_march() {
+    let host = Host::new();
+    let options = CloudsOptions {
+        over_depth: true,
+        ..small()
+    };
+    let targets = Targets {
+        depth_format: Some(wgpu::TextureFormat::Depth32Float),
+        ..Host::targets()
+    };
+    let device = &gpu().device;
+    let mut clouds = Clouds::new(device, veduta::programs(), &targets, &options).unwrap();
+    let view = looking(300.0, 0.9);
+    let depths = device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d {
+            width: Host::WIDTH,
+            height: Host::HEIGHT,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Depth32Float,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    let target = depths.create_view(&Default::default());
+    clouds.set_host(device, &target).unwrap();
+    let light = |clouds: &mut Clouds, distance: f32| -> Vec<f32> {
+        // Depth of a point straight ahead; 0 is the sky.
+        let depth = if distance.is_finite() {
+            let clip = view.projection * ahead(distance);
+            clip.z / clip.w
+        } else {
+            0.0
+        };
+        let mut encoder = device.create_command_encoder(&Default::default());
+        drop(encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &target,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(depth),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        }));
+        gpu().queue.submit([encoder.finish()]);
+        let (_, _, words) = host.frame(clouds, &view);
+        words.chunks(4).map(|p| half(p[3])).collect()
+    };
+    let free = light(&mut clouds, f32::INFINITY);
+    let before = light(&mut clouds, 2500.0);
+    let within = light(&mut clouds, 5500.0);
+    let behind = light(&mut clouds, 70_000.0);
+    assert!(before.iter().all(|t| *t == 1.0));
+    assert!(free.iter().zip(&behind).all(|(a, b)| (a - b).abs() < 0.01));
+    let cut = free.iter().zip(&within).filter(|(a, b)| **b > **a + 0.01);
+    assert!(cut.count() > free.len() / 10);
+    assert!(within.iter().sum::<f32>() > free.iter().sum::<f32>());
+}
+
+fn ahead(distance: f32) -> veduta::glam::Vec4 {
+    veduta::glam::Vec4::new(0.0, 0.0, -distance, 1.0)
+}
+
+/// A number of 16 bits, finite.
+fn half(bits: u16) -> f32 {
+    let (exponent, rest) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023));
+    let size = if exponent == 0 {
+        rest * 2.0_f32.powi(-24)
+    } else {
+        (1.0 + rest / 1024.0) * 2.0_f32.powi(exponent - 15)
+    };
+    if bits >> 15 == 1 { -size } else { size }
 }
 
 struct Host {

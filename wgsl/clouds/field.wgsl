@@ -65,3 +65,16 @@ fn cloud_density(layer: CloudLayer, relative: vec3<f32>, altitude: f32) -> f32 {
     let inside = altitude >= layer.bottom && altitude <= layer.bottom + layer.thickness;
     return select(0.0, shape_coverage(n, layer.coverage, layer.uniformity), inside);
 }
+
+/// Density of the layer before its cut: below 0 where there is no cloud, the more the farther from one; not cut at the layer's spheres either.
+///
+/// domain  relative in [-1e5, 1e5] m lin
+/// domain  altitude in [0, 2e4] m lin
+/// range   [-1e6, 1] 1
+/// error   2e-5 abs of reference::clouds::uncut_density
+/// source  as cloud_density
+fn uncut_density(layer: CloudLayer, relative: vec3<f32>, altitude: f32) -> f32 {
+    let turn = layer.turn + turn_3d(vec3<f32>(relative.x, altitude, relative.z) * layer.turns_per_metre);
+    let n = fbm_value_3d_torus_six(turn, layer.period_doublings, layer.fall, layer.seed);
+    return (mix(n, 1.0, layer.uniformity) - (1.0 - layer.coverage)) * (1.0 / max(layer.coverage, 1e-6));
+}

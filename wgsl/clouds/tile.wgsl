@@ -4,7 +4,7 @@
 #define_import_path veduta::clouds::tile
 
 #import veduta::planet::shell::{altitude_along, shell_segment, clip_segment, segment_length, segment_distance}
-#import veduta::clouds::integral::{step_light}
+#import veduta::clouds::integral::{mean_density}
 #import veduta::clouds::march::{CloudLight}
 
 /// A tile that repeats along x and z.
@@ -23,11 +23,18 @@ struct CloudTile {
     levels: f32,
     /// Extinction at full density [1/m].
     extinction: f32,
+    /// Way that is free of clouds for each unit that the tile's density is below 0 [m].
+    clear: f32,
 }
 
-/// Density and optical depth to the sun at a point given relative to the eye, whose altitude is `altitude`.
+/// Density before its cut at 0 and optical depth to the sun at a point given relative to the eye, whose altitude is `altitude`.
 ///
-/// internal
+/// domain  relative in [-1e5, 1e5] m lin
+/// domain  altitude in [4000, 5500] m lin
+/// range   [-1e3, 6.5e4] 1
+/// error   2e-2 abs of reference::clouds::uncut_density
+/// outside undefined
+/// source  ours
 fn tile_at(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: vec2<f32>, altitude: f32) -> vec2<f32> {
     let above = clamp(altitude - layer.bottom, 0.0, layer.thickness);
     let place = layer.place + (relative - layer.shear * above) * layer.tiles_per_metre;
@@ -35,9 +42,10 @@ fn tile_at(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: v
     return textureSampleLevel(tile, linear, vec3<f32>(place, level), 0.0).xy;
 }
 
-/// Light of the cloud layer along a view ray up to `max_distance`, in `steps` equal steps of one fetch, for an albedo and a phase function of 1.
-/// Light and depth of a step are exact where its extinction is even and the depth to the sun changes evenly. Ends when less than `min_transmittance` is
-/// left.
+/// Light of the cloud layer along a view ray up to `max_distance`, in steps of one fetch, for an albedo and a phase function of 1. `steps` are those of a
+/// ray that is eight times as long in the layer as the layer is thick; a longer ray takes more, a shorter one less, by the root of its length. Steps grow
+/// where the tile says that no cloud is near. Light and depth of a step are exact where its extinction is even and the depth to the sun changes
+/// evenly. Ends when less than `min_transmittance` is left.
 ///
 /// domain  ground_radius in [3e6, 1e8] m log
 /// domain  eye_altitude in [0, 1e5] m lin
@@ -54,34 +62,49 @@ fn march_tile(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, ground_r
     let whole = shell_segment(ground_radius, layer.bottom, layer.bottom + layer.thickness, eye_altitude, dir.y);
     let segment = clip_segment(whole, max_distance);
     let size = segment_length(segment);
-    let count = select(0, max(steps, 1), size > 0.0);
-    let ds = size / f32(max(count, 1));
-    let scale = 0.5 * layer.extinction * ds;
+    let share = sqrt(size / max(8.0 * layer.thickness, 1e-3));
+    let count = select(0, clamp(i32(ceil(f32(steps) * share)), 2, 4 * max(steps, 1)), size > 0.0);
+    let even = size / f32(max(count, 1));
     // Altitudes by a parabola about the middle of the segment.
     let middle = 0.5 * (segment.near + segment.far);
     let level = altitude_along(ground_radius, eye_altitude, dir.y, middle);
     let radius = ground_radius + level;
     let rise = clamp(((ground_radius + eye_altitude) * dir.y + middle) / radius, -1.0, 1.0);
     let bend = 0.5 * (1.0 - rise * rise) / radius;
-    let start = segment_distance(segment, 0.0);
-    let before = start - middle;
-    var here = tile_at(tile, linear, layer, dir.xz * start, level + before * (rise + before * bend));
-    var transmittance = 1.0;
+    let deepest = -log(max(min_transmittance, 1e-20));
+    var t = segment_distance(segment, 0.0);
+    let before = t - middle;
+    var here = tile_at(tile, linear, layer, dir.xz * t, level + before * (rise + before * bend));
+    var depth = 0.0;
+    var left = 1.0;
+    var lit = exp(-here.y);
+    var reach = here.y;
     var scatter = 0.0;
     var weighted = 0.0;
     var samples = 0;
-    for (var i = 1; i <= count && transmittance > min_transmittance; i++) {
-        let t = segment_distance(segment, f32(i) * ds);
-        let off = t - middle;
-        let next = tile_at(tile, linear, layer, dir.xz * t, level + off * (rise + off * bend));
-        let depth = scale * (here.x + next.x);
-        let left = transmittance * exp(-depth);
-        scatter += transmittance * step_light(depth, here.y, next.y);
-        weighted += (transmittance - left) * (t - 0.5 * ds);
-        transmittance = left;
+    var s = 0.0;
+    for (var i = 0; i < count && s < size && depth < deepest; i++) {
+        s = min(s + max(even, -layer.clear * here.x), size);
+        let at = segment_distance(segment, s);
+        let off = at - middle;
+        let next = tile_at(tile, linear, layer, dir.xz * at, level + off * (rise + off * bend));
+        let added = mean_density(here.x, next.x) * layer.extinction * (at - t);
+        depth += added;
+        // Light at the end of the step, and its mean: the logarithmic one.
+        let ahead = depth + next.y;
+        let dim = exp(-ahead);
+        let change = ahead - reach;
+        let mean = select((lit - dim) / change, 0.33333334 * (0.5 * (lit + dim) + 2.0 * sqrt(lit * dim)), abs(change) < 0.5);
+        scatter += added * mean;
+        let through = exp(-depth);
+        weighted += (left - through) * 0.5 * (at + t);
+        left = through;
+        lit = dim;
+        reach = ahead;
         here = next;
+        t = at;
         samples += 1;
     }
-    let weight = 1.0 - transmittance;
-    return CloudLight(scatter, transmittance, select(segment.near, weighted / max(weight, 1e-12), weight > 1e-6), samples, 0);
+    let weight = 1.0 - left;
+    return CloudLight(scatter, left, select(segment.near, weighted / max(weight, 1e-12), weight > 1e-6), samples, 0);
 }

@@ -39,6 +39,8 @@ struct CloudDraw {
     backward_share: f32,
     // Depth where there is nothing before the sky.
     sky_depth: f32,
+    // Way that is free of clouds for each unit that the tile's density is below 0 [m].
+    clear: f32,
 }
 
 @group(0) @binding(0) var<uniform> draw_view: CloudDraw;
@@ -84,7 +86,7 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     let reached = linear_depth / max(dot(dir, draw_view.forward), 1e-4);
     far = select(min(far, max(reached, 0.0)), far, depth == draw_view.sky_depth || reached > 1e8);
 #endif
-    let layer = CloudTile(draw_view.place, draw_view.shear, draw_view.tiles_per_metre, draw_view.bottom, draw_view.thickness, draw_view.levels, draw_view.extinction);
+    let layer = CloudTile(draw_view.place, draw_view.shear, draw_view.tiles_per_metre, draw_view.bottom, draw_view.thickness, draw_view.levels, draw_view.extinction, draw_view.clear);
     let light = march_tile(tile, linear, layer, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS);
     let phase = phase_double_henyey_greenstein(dot(dir, draw_view.to_sun), draw_view.g_forward, draw_view.g_backward, draw_view.backward_share);
     return vec4<f32>(light.scatter * phase * draw_view.sun_light + (1.0 - light.transmittance) * draw_view.ambient, light.transmittance);

@@ -4,7 +4,8 @@ Bakes rows of the tile of a cloud layer: every column follows a ray to the sun, 
 
 #COMPUTE{
     #CODE{
-#import veduta::clouds::field::{CloudLayer, cloud_density}
+#import veduta::clouds::field::{CloudLayer, uncut_density}
+#import veduta::clouds::integral::{mean_density}
 
 struct TileRows {
     // Horizontal way of the sun's ray per metre of height.
@@ -30,9 +31,9 @@ struct TileRows {
 @group(0) @binding(0) var<uniform> tile: TileRows;
 @group(2) @binding(0) var<storage, read_write> texels: array<u32>;
 
-// The bits of a number from 0 to 65,000 as a 16-bit float, rounded; below 6e-5 it may become 0.
+// The bits of a number from -65,000 to 65,000 as a 16-bit float, rounded; what is within 6e-5 of 0 may become 0.
 fn half(x: f32) -> u32 {
-    return (bitcast<u32>(x * 1.92592994e-34) + 0x1000u) >> 13u;
+    return ((bitcast<u32>(abs(x) * 1.92592994e-34) + 0x1000u) >> 13u) | select(0u, 0x8000u, x < 0.0);
 }
 
 @compute @workgroup_size(64)
@@ -47,7 +48,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     let k = tile.first_row + column / tile.texels;
     let foot = (vec2<f32>(f32(i), f32(k)) + 0.5) / f32(tile.texels) * tile.edge;
     let height = tile.thickness / f32(tile.levels - 1);
-    let scale = 0.5 * tile.extinction * height * tile.slant;
+    let scale = tile.extinction * height * tile.slant;
     var above = 0.0;
     var depth = 0.0;
     for (var j = tile.levels - 1; j >= 0; j--) {
@@ -55,8 +56,8 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
         let at = foot + tile.shear * up;
         // Not beyond the spheres by rounding.
         let altitude = clamp(tile.bottom + up, tile.bottom, tile.bottom + tile.thickness);
-        let density = cloud_density(layer, vec3<f32>(at.x, 0.0, at.y), altitude);
-        depth += select(scale * (above + density), 0.0, j == tile.levels - 1);
+        let density = clamp(uncut_density(layer, vec3<f32>(at.x, 0.0, at.y), altitude), -1000.0, 1.0);
+        depth += select(scale * mean_density(above, density), 0.0, j == tile.levels - 1);
         above = density;
         texels[(j * tile.rows + column / tile.texels) * tile.texels + i] = half(density) | (half(min(depth, 6e4)) << 16u);
     }

@@ -1,4 +1,4 @@
-Light in a cube of any density, a query: depths towards the sun, light of all orders by sweeps of discrete directions over cells, and the
+Light in a cube of any density, or in a layer that repeats, a query: depths towards the sun, light of all orders by sweeps of discrete directions over cells, and the
 march along rays. Everything lies in storage buffers, so that densities keep their 32 bits. One invocation a node, a cell, a ray; the sweep has a
 workgroup a direction, which goes from plane to plane.
 
@@ -10,8 +10,12 @@ orders a table of depth and angle holds.
 #COMPUTE{
     #CODE{
 #import veduta::clouds::harmonics::{Harmonics, harmonics}
-#import veduta::clouds::integral::{step_light}
+#import veduta::clouds::integral::{mean_density, step_light}
 #import veduta::lighting::phase::{phase_henyey_greenstein}
+#ifdef CLOUD_LAYERED
+#import veduta::clouds::tile::{CloudTile, tile_at}
+#import veduta::planet::shell::{shell_segment, clip_segment, segment_length, segment_distance, altitude_along, ground_distance, direction_cosine_along}
+#endif
 #import veduta::math::series::{one_minus_exp, one_minus_exp_over_x}
 
 struct CloudGrid {
@@ -44,9 +48,36 @@ struct CloudGrid {
     all_orders: i32,
     count: i32,
     coarse: vec3<i32>,
+    // Of a layer, whose free directions are those above: radiance that comes from below.
+    below: f32,
+    shear: vec2<f32>,
+    bottom: f32,
+    thickness: f32,
+    ground_radius: f32,
+    levels: f32,
 }
 
 @group(0) @binding(0) var<uniform> grid: CloudGrid;
+
+#ifdef CLOUD_LAYERED
+@group(1) @binding(0) var linear: sampler;
+@group(1) @binding(1) var tile: texture_3d<f32>;
+
+// A layer's cells repeat along x and z.
+fn cell_index(at: vec3<i32>, n: vec3<i32>) -> i32 {
+    let k = vec3<i32>((at.x + n.x) % n.x, clamp(at.y, 0, n.y - 1), (at.z + n.z) % n.z);
+    return (k.z * n.y + k.y) * n.x + k.x;
+}
+
+fn sampled(relative: vec2<f32>, altitude: f32) -> vec2<f32> {
+    let layer = CloudTile(vec2<f32>(0.0), grid.shear, 1.0 / grid.size, grid.bottom, grid.thickness, grid.levels, grid.extinction, 0.0);
+    return tile_at(tile, linear, layer, relative, altitude);
+}
+#else
+fn cell_index(at: vec3<i32>, n: vec3<i32>) -> i32 {
+    let k = clamp(at, vec3<i32>(0), n - 1);
+    return (k.z * n.y + k.y) * n.x + k.x;
+}
 
 @group(1) @binding(0) var<storage, read> density: array<f32>;
 
@@ -104,6 +135,7 @@ fn baked_depth(point: vec3<f32>) -> f32 {
 }
 
 @group(2) @binding(0) var<storage, read_write> depths: array<f32>;
+#endif
 
 // Extinction without the peak [1/m] and the mean of the sun's light over what there is in the cell.
 @group(2) @binding(1) var<storage, read_write> filled: array<vec2<f32>>;
@@ -163,20 +195,20 @@ fn peak_light(angle: f32, depth: f32) -> f32 {
 
 // What the cells scatter into the view.
 fn diffuse_source(point: vec3<f32>, view: Harmonics) -> f32 {
-    let q = clamp(point * vec3<f32>(grid.cells) - 0.5, vec3<f32>(0.0), vec3<f32>(grid.cells - 1));
+    let q = point * vec3<f32>(grid.cells) - 0.5;
     let base = floor(q);
     let f = q - base;
     var sum = 0.0;
     for (var j = 0; j < 8; j++) {
         let offset = vec3<i32>(j & 1, (j >> 1u) & 1, j >> 2u);
-        let k = min(vec3<i32>(base) + offset, grid.cells - 1);
         let w = select(1.0 - f, f, offset == vec3<i32>(1));
-        let at = 4 * ((k.z * grid.cells.y + k.y) * grid.cells.x + k.x);
+        let at = 4 * cell_index(vec3<i32>(base) + offset, grid.cells);
         sum += w.x * w.y * w.z * (dot(moments[at], view.zeroth) + dot(moments[at + 1], view.second) + dot(moments[at + 2], view.middle) + dot(moments[at + 3], view.third));
     }
     return max(sum, 0.0);
 }
 
+#ifndef CLOUD_LAYERED
 fn depth_to_sun(point: vec3<f32>) -> f32 {
 #ifdef CLOUD_READS_NODES
     return baked_depth(point);
@@ -184,6 +216,7 @@ fn depth_to_sun(point: vec3<f32>) -> f32 {
     return marched_depth(point);
 #endif
 }
+#endif
 
 #ifdef CLOUD_NODES
 @compute @workgroup_size(64)
@@ -212,9 +245,16 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var j = 0; j < 64; j++) {
         let part = (vec3<f32>(f32(j & 3), f32((j >> 2u) & 3), f32(j >> 4u)) + 0.5) * 0.25;
         let point = (corner + part) / vec3<f32>(n);
+#ifdef CLOUD_LAYERED
+        let found = sampled(grid.size * point.xz, grid.bottom + grid.thickness * point.y);
+        let rho = max(found.x, 0.0);
+        let toward = found.y;
+#else
         let rho = density_at(point);
+        let toward = baked_depth(point);
+#endif
         sum += rho;
-        lit += rho * exp(-kept * baked_depth(point));
+        lit += rho * exp(-kept * toward);
     }
     filled[i] = vec2<f32>(kept * grid.extinction * sum / 64.0, lit / max(sum, 1e-30));
 }
@@ -245,12 +285,19 @@ fn sweep(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
                 let ka = a + i32(first.x) + ja;
                 let kb = b + i32(first.y) + jb;
                 let weight = select(1.0 - part.x, part.x, ja == 1) * select(1.0 - part.y, part.y, jb == 1);
+#ifdef CLOUD_LAYERED
+                let inside = has_before;
+                let at = select(here, before * way.strides.x + ((ka + 64 * way.counts.y) % way.counts.y) * way.strides.y + ((kb + 64 * way.counts.z) % way.counts.z) * way.strides.z, inside);
+                let outside = select(grid.below, grid.uniform_light, way.counts.w < 0);
+#else
                 let inside = has_before && ka >= 0 && ka < way.counts.y && kb >= 0 && kb < way.counts.z;
                 let at = select(here, before * way.strides.x + ka * way.strides.y + kb * way.strides.z, inside);
+                let outside = grid.uniform_light;
+#endif
                 let thickness = select(0.0, weight * cells[at].x, inside);
                 sigma += thickness;
                 emitted += thickness * source[start + at];
-                arriving += weight * select(grid.uniform_light, radiance[start + at], inside);
+                arriving += weight * select(outside, radiance[start + at], inside);
             }
             let own = source[start + here];
             let upstream = select(own, emitted / max(sigma, 1e-30), sigma > 1e-30);
@@ -280,15 +327,14 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
     let d_middle = vec4<f32>(d.z, d.w, d.w, d.w);
 #ifdef CLOUD_PROLONG
     let place = vec3<f32>(vec3<i32>(i % n.x, (i / n.x) % n.y, i / (n.x * n.y))) + 0.5;
-    let q = clamp(place / vec3<f32>(n) * vec3<f32>(grid.coarse) - 0.5, vec3<f32>(0.0), vec3<f32>(grid.coarse - 1));
+    let q = place / vec3<f32>(n) * vec3<f32>(grid.coarse) - 0.5;
     let base = floor(q);
     for (var j = 0; j < 8; j++) {
         let offset = vec3<i32>(j & 1, (j >> 1u) & 1, j >> 2u);
-        let k = min(vec3<i32>(base) + offset, grid.coarse - 1);
         let f = q - base;
         let w = select(1.0 - f, f, offset == vec3<i32>(1));
         let weight = w.x * w.y * w.z;
-        let at = 4 * ((k.z * grid.coarse.y + k.y) * grid.coarse.x + k.x);
+        let at = 4 * cell_index(vec3<i32>(base) + offset, grid.coarse);
         sum.zeroth += weight * coarser[at];
         sum.second += weight * coarser[at + 1];
         sum.middle += weight * coarser[at + 2];
@@ -321,6 +367,60 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var j = 0; j < count; j++) {
         sent[j * all + i] = dot(sum.zeroth, ways[j].zeroth) + dot(sum.second, ways[j].second) + dot(sum.middle, ways[j].middle) + dot(sum.third, ways[j].third);
     }
+}
+#else
+#ifdef CLOUD_LAYERED
+@compute @workgroup_size(64)
+fn find(@builtin(global_invocation_id) id: vec3<u32>) {
+    if i32(id.x) >= grid.count {
+        return;
+    }
+    let dir = rays[id.x].dir;
+    let eye = rays[id.x].origin.x;
+    let ground = ground_distance(grid.ground_radius, eye, dir.y);
+    let end = rays[id.x].origin.y;
+    let segment = clip_segment(shell_segment(grid.ground_radius, grid.bottom, grid.bottom + grid.thickness, eye, dir.y), select(end, min(end, ground), ground >= 0.0));
+    let size = segment_length(segment);
+    let nu = clamp(dot(dir, grid.to_sun), -1.0, 1.0);
+    let angle = acos(nu);
+    let kept = 1.0 - grid.albedo * grid.peak;
+    let view = harmonics(-dir);
+    let straight = harmonics(-grid.to_sun);
+    let d = grid.degrees;
+    let turned = dot(vec4<f32>(d.x, d.y, d.y, d.y) * straight.zeroth, view.zeroth) + d.z * dot(straight.second, view.second)
+        + dot(vec4<f32>(d.z, d.w, d.w, d.w) * straight.middle, view.middle) + d.w * dot(straight.third, view.third);
+    let ds = max(size / 1500.0, grid.step);
+    var depth = 0.0;
+    var scatter = 0.0;
+    var s = 0.0;
+    var t = segment_distance(segment, 0.0);
+    var here = sampled(dir.xz * t, altitude_along(grid.ground_radius, eye, dir.y, t));
+    for (var i = 0; i < 1502 && s < size && kept * depth < 14.0; i++) {
+        s = min(s + ds, size);
+        let at = segment_distance(segment, s);
+        let altitude = altitude_along(grid.ground_radius, eye, dir.y, at);
+        let next = sampled(dir.xz * at, altitude);
+        let added = mean_density(here.x, next.x) * grid.extinction * min(ds, at - t);
+        if added > 0.0 {
+            let middle = 0.5 * (at + t);
+            let rise = direction_cosine_along(grid.ground_radius, eye, altitude, grid.to_sun.y, nu, at);
+            let lit = select(grid.sun, 0.0, ground_distance(grid.ground_radius, altitude, rise) >= 0.0);
+            let left = exp(-depth);
+            let left_kept = exp(-kept * depth);
+            scatter += lit * left * peak_light(angle, 0.5 * (here.y + next.y)) * step_light(added, kept * here.y, kept * next.y);
+            scatter += lit * left_kept * turned * step_light(kept * added, kept * here.y, kept * next.y);
+            let up = altitude_along(grid.ground_radius, eye, dir.y, middle) - grid.bottom;
+            let place = vec3<f32>(dir.x * middle / grid.size, up / grid.thickness, dir.z * middle / grid.size);
+            scatter += left_kept * one_minus_exp(kept * added) * diffuse_source(place - vec3<f32>(floor(place.x), 0.0, floor(place.z)), view);
+            depth += added;
+        }
+        here = next;
+        t = at;
+    }
+    let through = exp(-depth);
+    let behind = select(grid.uniform_light, grid.below, ground >= 0.0 || dir.y < 0.0);
+    scatter += behind * (exp(-kept * depth) - through);
+    results[id.x] = CubeLight(max(scatter, 0.0), through);
 }
 #else
 @compute @workgroup_size(64)
@@ -386,6 +486,7 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     // Four degrees of a needle can fall a little below nothing.
     results[id.x] = CubeLight(max(scatter, 0.0), through);
 }
+#endif
 #endif
 #endif
 #endif

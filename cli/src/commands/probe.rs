@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use veduta::Atmosphere;
 use veduta::atmosphere::{Orders, ProbeOptions, ProbePath, ProbeRay, SkyQuality, probe};
-use veduta::clouds::{CloudDeck, CubeOptions, CubeRay, DensityCube, cube_light, layer_light};
+use veduta::clouds::{
+    AirLights, CloudDeck, CubeOptions, CubeRay, DensityCube, LayerOptions, cube_light, layer_light,
+};
 use veduta::eval::ResultKind;
 use veduta::reference;
 use veduta::terrain::{Land, RayPath, TerrainRay, ray_hits};
@@ -49,38 +51,24 @@ pub struct CloudsArgs {
     /// A shipped layer or a .ron file; its rows are those of `probe sky`
     #[arg(long, value_name = "NAME|FILE")]
     pub scene: Option<String>,
-    /// Extinction per unit of density, 1/m
-    #[arg(
-        long,
-        value_name = "E",
-        default_value = "1",
-        allow_hyphen_values = true
-    )]
-    pub extinction: f64,
-    /// Scattered share of the extinction
-    #[arg(
-        long,
-        value_name = "A",
-        default_value = "1",
-        allow_hyphen_values = true
-    )]
-    pub albedo: f64,
-    /// Asymmetry of the phase function, one lobe of Henyey and Greenstein
-    #[arg(
-        long,
-        value_name = "G",
-        default_value = "0.85",
-        allow_hyphen_values = true
-    )]
-    pub g: f64,
-    /// Edge of the cube in metres
-    #[arg(
-        long,
-        value_name = "METRES",
-        default_value = "1000",
-        allow_hyphen_values = true
-    )]
-    pub size: f64,
+    /// Extinction per unit of density, 1/m [default: 1; a layer's own]
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
+    pub extinction: Option<f64>,
+    /// Scattered share of the extinction [default: 1; a layer's own]
+    #[arg(long, value_name = "A", allow_hyphen_values = true)]
+    pub albedo: Option<f64>,
+    /// Asymmetry of the phase function, one lobe of Henyey and Greenstein [default: 0.85; a layer's own two lobes]
+    #[arg(long, value_name = "G", allow_hyphen_values = true)]
+    pub g: Option<f64>,
+    /// Edge of the cube in metres [default: 1000]
+    #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
+    pub size: Option<f64>,
+    /// A layer under an air: the sun behind it, and for all orders the sky's light and the ground's. The clouds alone are shown, without the air before them
+    #[arg(long)]
+    pub lit: bool,
+    /// The air of --lit: a shipped atmosphere or a .ron file
+    #[arg(long, value_name = "NAME|FILE", default_value = "earth")]
+    pub atmosphere: String,
     /// The rays, .npy or .csv: origin and direction in cube coordinates, direction to the sun
     #[arg(long, value_name = "ROWS")]
     pub rays: PathBuf,
@@ -267,14 +255,21 @@ fn clouds(args: &CloudsArgs) -> Result<(), CliError> {
     let Some(volume) = &args.volume else {
         return layer(args);
     };
+    if args.lit {
+        return Err(CliError::argument(
+            "--lit",
+            "given",
+            "left out for a cube, which is in vacuum",
+        ));
+    }
     let (shape, density) = read_cube(volume)?;
     let cube = DensityCube {
         values: [shape[2], shape[1], shape[0]],
         density,
-        size: args.size,
-        extinction: args.extinction,
-        albedo: args.albedo,
-        g: args.g,
+        size: args.size.unwrap_or(1000.0),
+        extinction: args.extinction.unwrap_or(1.0),
+        albedo: args.albedo.unwrap_or(1.0),
+        g: args.g.unwrap_or(0.85),
     };
     cube.check()?;
     let numbers = Table::read(&args.rays, 9)?.to_numbers(&args.rays)?;
@@ -363,14 +358,37 @@ pub fn deck(name: &str) -> Result<CloudDeck, CliError> {
 }
 
 fn layer(args: &CloudsArgs) -> Result<(), CliError> {
-    if args.furnace {
-        return Err(CliError::argument(
-            "--furnace",
-            "given",
-            "left out for a layer",
-        ));
+    let refused = |name: &str, given: bool, domain: &str| {
+        if given {
+            return Err(CliError::argument(name, "given", domain));
+        }
+        Ok(())
+    };
+    let device = args.path != How::Reference;
+    refused(
+        "--furnace",
+        args.furnace && !device,
+        "left out for the reference of a layer, below which there is dark ground",
+    )?;
+    refused(
+        "--furnace",
+        args.furnace && args.lit,
+        "left out beside --lit",
+    )?;
+    refused(
+        "--lit",
+        args.lit && !device,
+        "left out for the reference, which knows no air",
+    )?;
+    refused("--size", args.size.is_some(), "left out for a layer")?;
+    let mut deck = deck(args.scene.as_deref().unwrap_or("thesis"))?;
+    deck.extinction = args.extinction.unwrap_or(deck.extinction);
+    deck.albedo = args.albedo.unwrap_or(deck.albedo);
+    if let Some(g) = args.g {
+        (deck.g_forward, deck.g_backward) = (g.max(0.0), g.min(0.0));
+        deck.backward_share = if g < 0.0 { 1.0 } else { 0.0 };
     }
-    let deck = deck(args.scene.as_deref().unwrap_or("thesis"))?;
+    deck.check()?;
     let numbers = Table::read(&args.rays, 8)?.to_numbers(&args.rays)?;
     let rays = numbers
         .as_chunks::<8>()
@@ -408,21 +426,55 @@ fn layer(args: &CloudsArgs) -> Result<(), CliError> {
         }
         return write_results(&args.out, &light, 6, ResultKind::F32);
     }
-    if orders == Orders::All {
-        return Err(CliError::argument(
-            "--orders",
-            "all",
-            "`single` for a layer on the device, which has no light of more orders yet",
-        ));
-    }
     let path = if args.path == How::Fast {
         ProbePath::Fast
     } else {
         ProbePath::Textbook
     };
     let gpu = veduta::device::shared()?;
-    for found in layer_light(gpu, veduta::programs(), &deck, &rays, path)? {
-        add(found.scatter, found.transmittance);
+    let found = |sun: f32, around: [f32; 2]| {
+        let options = LayerOptions {
+            path,
+            orders,
+            sun,
+            around,
+        };
+        layer_light(gpu, veduta::programs(), &deck, &rays, &options)
+    };
+    if args.furnace {
+        for found in found(0.0, [1.0; 2])? {
+            add(found.scatter, found.transmittance);
+        }
+    } else if args.lit {
+        let from_sun = found(1.0, [0.0; 2])?;
+        // Light adds up: that from above and below is found for a radiance of 1.
+        let around = if orders == Orders::All {
+            Some([found(0.0, [1.0, 0.0])?, found(0.0, [0.0, 1.0])?])
+        } else {
+            None
+        };
+        let air = atmosphere(&args.atmosphere)?;
+        let mut suns: Vec<([f64; 3], AirLights)> = Vec::new();
+        for (i, ray) in rays.iter().enumerate() {
+            let lights = match suns.iter().find(|(sun, _)| *sun == ray.to_sun) {
+                Some((_, lights)) => *lights,
+                None => {
+                    let lights = AirLights::find(gpu, &air, &deck, ray.to_sun)?;
+                    suns.push((ray.to_sun, lights));
+                    lights
+                }
+            };
+            let mut scatter = from_sun[i].scatter * lights.sun;
+            if let Some([above, below]) = &around {
+                scatter += above[i].scatter * lights.above + below[i].scatter * lights.below;
+            }
+            light.extend(scatter.to_array().map(f32::to_bits));
+            light.extend([from_sun[i].transmittance; 3].map(f32::to_bits));
+        }
+    } else {
+        for found in found(1.0, [0.0; 2])? {
+            add(found.scatter, found.transmittance);
+        }
     }
     write_results(&args.out, &light, 6, ResultKind::F32)
 }

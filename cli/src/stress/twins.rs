@@ -62,6 +62,10 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "a_layer_from_its_tile_meets_the_march",
     ),
     (
+        "veduta::clouds::tile::tile_at",
+        "a_layer_from_its_tile_meets_the_march",
+    ),
+    (
         "veduta::terrain::clipmap::baked_height",
         "valleys_see_less_of_the_sky",
     ),
@@ -1550,13 +1554,28 @@ pub fn registry() -> Vec<Entry> {
         aerial_slice
     );
     same!(list, "clouds::field", "clouds", clouds, shape_coverage);
-    same!(list, "clouds::integral", "clouds", clouds, step_light);
+    same!(
+        list,
+        "clouds::integral",
+        "clouds",
+        clouds,
+        step_light,
+        mean_density
+    );
     same!(list, "clouds::harmonics", "clouds", clouds, harmonics);
     other!(
         list,
         "clouds::field::cloud_density",
         "clouds::cloud_density",
         |layer: CloudLayer, relative: [f64; 3], altitude: f64| clouds::cloud_density(
+            &layer, relative, altitude
+        )
+    );
+    other!(
+        list,
+        "clouds::field::uncut_density",
+        "clouds::uncut_density",
+        |layer: CloudLayer, relative: [f64; 3], altitude: f64| clouds::uncut_density(
             &layer, relative, altitude
         )
     );
@@ -1893,6 +1912,7 @@ const MEASURED: &[(&str, f64)] = &[
     ("atmosphere::textbook::march_sun_depth", 120.0),
     ("clouds::composite::composite_clouds", 3.0),
     ("clouds::field::cloud_density", 5.1),
+    ("clouds::field::uncut_density", 5.1),
     ("clouds::march::march_clouds", 110.0),
     ("clouds::march::march_clouds_skip", 48.0),
     ("clouds::march::sun_depth", 51.0),
@@ -2120,6 +2140,7 @@ fn particular(entry: Entry) -> Entry {
             .branch("altitude", &[4000.0, 5500.0])
             .jumps("the layer's borders", 1e-6)
             .weight(20.0),
+        ("clouds::field", "uncut_density") => entry.layer().weight(20.0),
         ("clouds::march", "layer_exit") => entry.layer().jumps("tangent rays", 1e-6).weight(2.0),
         ("clouds::march", "sun_depth") => entry
             .layer()

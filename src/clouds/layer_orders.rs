@@ -1,0 +1,282 @@
+//! Light of all orders in a layer that repeats: the sweeps of [`super::volume`] over cells of its tile.
+
+use super::directions::{directions, harmonics};
+use super::phase::Lobes;
+use super::tile::{Tile, slant};
+use super::volume::{Kernel, WAY, filled, room};
+use super::{CloudDeck, CubeLight};
+use crate::atmosphere::ProbeRay;
+use crate::device::Gpu;
+use crate::error::Error;
+use crate::exchange::{Exchange, compute};
+use crate::program::ProgramSet;
+use crate::programs::blocks::CloudGrid as GridBlock;
+
+/// Cells along the horizontal edges and along the height, with sweeps: light that goes far is found on coarse grids.
+const GRIDS: [(usize, usize, usize); 3] = [(24, 6, 80), (48, 12, 24), (96, 20, 8)];
+
+/// What a layer is lit by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Lighting {
+    /// Irradiance of the sun.
+    pub sun: f32,
+    /// Radiance from above and from below.
+    pub around: [f32; 2],
+}
+
+/// What is the same for every sun.
+pub(super) struct LayerOrders<'a> {
+    gpu: &'a Gpu,
+    block: GridBlock,
+    thickness: f64,
+    peaks: wgpu::Buffer,
+    fill: Kernel,
+    sweep: Kernel,
+    gather: Kernel,
+    prolong: Kernel,
+    rays: Kernel,
+}
+
+impl<'a> LayerOrders<'a> {
+    /// For tiles of so many levels.
+    pub fn new(
+        gpu: &'a Gpu,
+        programs: &ProgramSet,
+        deck: &CloudDeck,
+        levels: u32,
+        shortest: f64,
+    ) -> Result<LayerOrders<'a>, Error> {
+        let lobes = Lobes {
+            albedo: deck.albedo,
+            g_forward: deck.g_forward,
+            g_backward: deck.g_backward,
+            backward_share: deck.backward_share,
+        };
+        let block = GridBlock {
+            size: deck.period() as f32,
+            extinction: deck.extinction as f32,
+            albedo: deck.albedo as f32,
+            peak: lobes.peak() as f32,
+            degrees: lobes.degrees().map(|d| d as f32),
+            all_orders: 1,
+            bottom: deck.bottom as f32,
+            thickness: deck.thickness as f32,
+            ground_radius: deck.planet_radius as f32,
+            levels: levels as f32,
+            step: shortest as f32,
+            ..Default::default()
+        };
+        let kernel = |flags: &[&str]| {
+            let flags: Vec<&str> = [&["CLOUD_LAYERED"], flags].concat();
+            compute(&gpu.device, programs, "cloud_volume", &flags, &[])
+        };
+        let peaks: Vec<u8> = lobes
+            .peak_table()
+            .iter()
+            .flat_map(|d| d.to_le_bytes())
+            .collect();
+        Ok(LayerOrders {
+            gpu,
+            block,
+            thickness: deck.thickness,
+            peaks: filled(gpu, &peaks),
+            fill: kernel(&["CLOUD_CELLS"])?,
+            sweep: kernel(&["CLOUD_SWEEP"])?,
+            gather: kernel(&["CLOUD_GATHER"])?,
+            prolong: kernel(&["CLOUD_GATHER", "CLOUD_PROLONG"])?,
+            rays: kernel(&[])?,
+        })
+    }
+
+    fn groups(
+        &self,
+        kernel: &Kernel,
+        bound: &[Vec<(u32, wgpu::BindingResource<'_>)>; 3],
+    ) -> Vec<wgpu::BindGroup> {
+        let made = |(layout, list): (_, &Vec<(u32, wgpu::BindingResource<'_>)>)| {
+            let entries: Vec<wgpu::BindGroupEntry<'_>> = list
+                .iter()
+                .map(|(binding, resource)| wgpu::BindGroupEntry {
+                    binding: *binding,
+                    resource: resource.clone(),
+                })
+                .collect();
+            self.gpu
+                .device
+                .create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some("veduta layer orders"),
+                    layout,
+                    entries: &entries,
+                })
+        };
+        kernel.1.iter().zip(bound).map(made).collect()
+    }
+
+    fn dispatch(
+        encoder: &mut wgpu::CommandEncoder,
+        kernel: &Kernel,
+        groups: &[wgpu::BindGroup],
+        count: usize,
+    ) {
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(&kernel.0);
+        for (index, group) in (0..).zip(groups) {
+            pass.set_bind_group(index, group, &[]);
+        }
+        pass.dispatch_workgroups(count as u32, 1, 1);
+    }
+
+    fn uniform(&self, block: &GridBlock) -> wgpu::Buffer {
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let buffer = room(&self.gpu.device, GridBlock::SIZE, usage);
+        self.gpu.queue.write_buffer(&buffer, 0, &block.to_bytes());
+        buffer
+    }
+
+    fn block(&self, to_sun: [f64; 3], lighting: &Lighting) -> GridBlock {
+        let to_sun = to_sun.map(|c| c as f32);
+        GridBlock {
+            to_sun,
+            shear: slant(to_sun).0,
+            sun: lighting.sun,
+            uniform_light: lighting.around[0],
+            below: lighting.around[1],
+            ..self.block
+        }
+    }
+
+    /// What the cells scatter, for a sun that the tile was baked for.
+    pub fn solve(&self, tile: &Tile, to_sun: [f64; 3], lighting: &Lighting) -> wgpu::Buffer {
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let mut coarser: Option<(wgpu::Buffer, [i32; 3])> = None;
+        for (edge, levels, sweeps) in GRIDS {
+            let count = edge * edge * levels;
+            let shape = [edge, levels, edge].map(|n| n as i32);
+            let uniform = self.uniform(&GridBlock {
+                cells: shape,
+                coarse: coarser.as_ref().map_or([1; 3], |c| c.1),
+                ..self.block(to_sun, lighting)
+            });
+            let storage = |size| room(device, size, usage);
+            let cells = storage(8 * count);
+            let source = storage(4 * 24 * count);
+            let moments = storage(64 * count);
+            let radiance = storage(4 * 24 * count);
+            let ways = self.ways(edge, levels);
+            let head = vec![(0, uniform.as_entire_binding())];
+            let seen = vec![
+                (0, wgpu::BindingResource::Sampler(&tile.sampler)),
+                (1, wgpu::BindingResource::TextureView(&tile.views[0])),
+            ];
+            let mut encoder = device.create_command_encoder(&Default::default());
+            let fill = self.groups(&self.fill, &[head.clone(), seen, held(&[(1, &cells)])]);
+            Self::dispatch(&mut encoder, &self.fill, &fill, count.div_ceil(64));
+            let gathered = |kernel: &Kernel, place: u32, from: &wgpu::Buffer| {
+                let read = held(&[(2, &ways), (3, &cells), (place, from)]);
+                self.groups(
+                    kernel,
+                    &[head.clone(), read, held(&[(3, &source), (4, &moments)])],
+                )
+            };
+            let gather = gathered(&self.gather, 5, &radiance);
+            let read = held(&[(2, &ways), (3, &cells), (4, &source)]);
+            let sweep = self.groups(&self.sweep, &[head.clone(), read, held(&[(2, &radiance)])]);
+            match &coarser {
+                Some((coarse, _)) => {
+                    let prolong = gathered(&self.prolong, 6, coarse);
+                    Self::dispatch(&mut encoder, &self.prolong, &prolong, count.div_ceil(64));
+                }
+                None => {
+                    let mean = 0.5 * (lighting.around[0] + lighting.around[1]);
+                    queue.write_buffer(&radiance, 0, &mean.to_le_bytes().repeat(24 * count));
+                    Self::dispatch(&mut encoder, &self.gather, &gather, count.div_ceil(64));
+                }
+            }
+            for _ in 0..sweeps {
+                Self::dispatch(&mut encoder, &self.sweep, &sweep, 24);
+                Self::dispatch(&mut encoder, &self.gather, &gather, count.div_ceil(64));
+            }
+            queue.submit([encoder.finish()]);
+            coarser = Some((moments, shape));
+        }
+        coarser.map_or_else(|| room(device, 64, usage), |c| c.0)
+    }
+
+    /// The directions with how each goes through cells, from level to level.
+    fn ways(&self, edge: usize, levels: usize) -> wgpu::Buffer {
+        let across = f64::from(self.block.size) / edge as f64;
+        let up = self.thickness / levels as f64;
+        let [n, k] = [edge as i32, levels as i32];
+        let mut bytes = Vec::with_capacity(24 * WAY);
+        for dir in directions() {
+            for h in harmonics(dir) {
+                bytes.extend((h as f32).to_le_bytes());
+            }
+            let sense = if dir[1] < 0.0 { -1 } else { 1 };
+            for number in [k, n, n, sense, n, 1, n * k, 0] {
+                bytes.extend(i32::to_le_bytes(number));
+            }
+            let rise = dir[1].abs();
+            let shift = up / across / rise;
+            for number in [-dir[0] * shift, -dir[2] * shift, up / rise, 0.0] {
+                bytes.extend((number as f32).to_le_bytes());
+            }
+        }
+        filled(self.gpu, &bytes)
+    }
+
+    /// The light along rays, for the sun of `tile` and `moments`.
+    pub fn run(
+        &self,
+        tile: &Tile,
+        moments: &wgpu::Buffer,
+        to_sun: [f64; 3],
+        lighting: &Lighting,
+        rays: &[ProbeRay],
+    ) -> Result<Vec<CubeLight>, Error> {
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let [n, levels] = [GRIDS[2].0, GRIDS[2].1].map(|n| n as i32);
+        let uniform = self.uniform(&GridBlock {
+            count: rays.len() as i32,
+            cells: [n, levels, n],
+            ..self.block(to_sun, lighting)
+        });
+        let mut rows = Vec::with_capacity(32 * rays.len());
+        for ray in rays {
+            let [x, y, z] = ray.dir;
+            let far = ray.distance.min(1e9);
+            for number in [ray.altitude, far, 0.0, 0.0, x, y, z, 0.0] {
+                rows.extend((number as f32).to_le_bytes());
+            }
+        }
+        let exchange = Exchange::new(device, queue, &rows, 8 * rays.len());
+        let read = vec![
+            (0, wgpu::BindingResource::Sampler(&tile.sampler)),
+            (1, wgpu::BindingResource::TextureView(&tile.views[0])),
+            (7, exchange.input.as_entire_binding()),
+            (8, self.peaks.as_entire_binding()),
+            (9, moments.as_entire_binding()),
+        ];
+        let head = vec![(0, uniform.as_entire_binding())];
+        let written = vec![(5, exchange.output.as_entire_binding())];
+        let groups = self.groups(&self.rays, &[head, read, written]);
+        let encoder = device.create_command_encoder(&Default::default());
+        let workgroups = rays.len().div_ceil(64) as u32;
+        let found = exchange.run(device, queue, encoder, &self.rays.0, &groups, workgroups)?;
+        let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+        Ok(found
+            .chunks_exact(8)
+            .map(|row| CubeLight {
+                scatter: number(row),
+                transmittance: number(&row[4..]),
+            })
+            .collect())
+    }
+}
+
+fn held<'b>(list: &[(u32, &'b wgpu::Buffer)]) -> Vec<(u32, wgpu::BindingResource<'b>)> {
+    list.iter()
+        .map(|(k, b)| (*k, b.as_entire_binding()))
+        .collect()
+}
