@@ -53,7 +53,7 @@ pub struct BenchArgs {
     pub views: Vec<String>,
     /// Presets beside `thesis` and `thesis_skip`, divided by commas [default: thesis_low,low,medium,high]
     #[arg(long = "of", value_name = "PRESETS", value_delimiter = ',')]
-    pub presets: Vec<String>,
+    pub of: Vec<String>,
     /// A value that holds everywhere; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub sets: Vec<String>,
@@ -99,7 +99,7 @@ impl BenchArgs {
                 line += &format!(" {name} {value}");
             }
         }
-        for (name, list) in [("--views", &self.views), ("--of", &self.presets)] {
+        for (name, list) in [("--views", &self.views), ("--of", &self.of)] {
             if !list.is_empty() {
                 line += &format!(" {name} {}", list.join(","));
             }
@@ -194,7 +194,7 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
         ),
         (
             "--of",
-            as_given(&args.presets),
+            as_given(&args.of),
             others(&[Subject::Presets]),
             "left out, or the subject `presets`",
         ),
@@ -268,7 +268,7 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
         Subject::Presets => {
             let plan = presets::Plan {
                 scene: "thesis".to_owned(),
-                presets: or_usual(&args.presets, &["thesis_low", "low", "medium", "high"]),
+                presets: or_usual(&args.of, &["thesis_low", "low", "medium", "high"]),
                 views: or_usual(&args.views, &VIEWS),
                 reference: "reference".to_owned(),
                 samples: 4,
