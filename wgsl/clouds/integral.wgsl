@@ -26,6 +26,7 @@ fn step_light(depth: f32, near: f32, far: f32) -> f32 {
 /// domain  next in [-10, 1] 1 lin
 /// range   [0, 1] 1
 /// error   1e-6 abs of reference::clouds::mean_density
+/// outside undefined
 /// source  elementary
 fn mean_density(here: f32, next: f32) -> f32 {
     let full = max(here, 0.0) + max(next, 0.0);
