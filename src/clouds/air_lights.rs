@@ -23,7 +23,7 @@ impl AirLights {
     /// The lights of a layer under an air, from the fast tables of the sky. Clouds neither shade the ground nor light the air. Submits and waits.
     ///
     /// # Errors
-    /// Those of [`probe`].
+    /// Those of [`crate::atmosphere::probe()`].
     pub fn find(
         gpu: &Gpu,
         air: &Atmosphere,
