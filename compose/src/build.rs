@@ -47,7 +47,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             &["AERIAL", "AERIAL_ALPHA"],
         ],
         "air_columns" | "air_diffuse" | "air_transmittance" | "sky_view" | "sky_refine"
-        | "sky_aerial" | "sky_probe" | "sky_query" | "probe" => &[&[]],
+        | "sky_columns" | "sky_aerial" | "sky_probe" | "sky_query" | "probe" => &[&[]],
         "terrain" | "terrain_heights" | "terrain_globe" | "terrain_globe_heights" => {
             return vec![BTreeSet::new()];
         }

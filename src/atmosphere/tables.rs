@@ -16,7 +16,7 @@ pub struct SkyQuality {
     pub columns: [u32; 2],
     /// Diffuse light: sun's height by altitude, each in [2, 1024].
     pub diffuse: [u32; 2],
-    /// Sky: azimuth by height above the horizon, each in [2, 1024]. Of each row that is computed the table has four: the others are interpolated by cubics.
+    /// Sky: azimuth by height above the horizon, each in [2, 1024]. The table has four times as many rows and twice as many columns, interpolated by cubics.
     pub sky: [u32; 2],
     /// Steps on each stretch of a ray of the sky, in [1, 64].
     pub sky_steps: u32,
@@ -101,6 +101,15 @@ impl SkyQuality {
 /// Rows that the table of the sky has for each that is computed.
 const ROWS_OF_EACH: u32 = 4;
 
+/// Columns that it has for each but the last.
+const COLUMNS_OF_EACH: u32 = 2;
+
+/// Texels of the table of the sky that pictures read.
+fn fine_size(quality: &SkyQuality) -> [u32; 2] {
+    let [columns, rows] = quality.sky;
+    [(columns - 1) * COLUMNS_OF_EACH + 1, rows * ROWS_OF_EACH]
+}
+
 /// Where an eye is, as far as the tables depend on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Eye {
@@ -154,6 +163,22 @@ impl Table {
     pub(super) fn new(
         device: &wgpu::Device,
         label: &str,
+        size: [u32; 2],
+        layers: Option<u32>,
+    ) -> Table {
+        Table::of(
+            device,
+            label,
+            wgpu::TextureFormat::Rgba16Float,
+            size,
+            layers,
+        )
+    }
+
+    fn of(
+        device: &wgpu::Device,
+        label: &str,
+        format: wgpu::TextureFormat,
         [width, height]: [u32; 2],
         layers: Option<u32>,
     ) -> Table {
@@ -167,7 +192,7 @@ impl Table {
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba16Float,
+            format,
             usage: wgpu::TextureUsages::TEXTURE_BINDING
                 | wgpu::TextureUsages::STORAGE_BINDING
                 | wgpu::TextureUsages::COPY_SRC,
@@ -186,7 +211,11 @@ impl Table {
 
     pub(super) fn bytes(&self) -> u64 {
         let size = self.texture.size();
-        8 * u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers)
+        let texel = self.texture.format().block_copy_size(None).unwrap_or(0);
+        u64::from(texel)
+            * u64::from(size.width)
+            * u64::from(size.height)
+            * u64::from(size.depth_or_array_layers)
     }
 }
 
@@ -290,16 +319,18 @@ pub struct SkyTables {
     look: wgpu::Buffer,
     sampler: wgpu::Sampler,
     columns: Table,
-    moments: [Table; 3],
-    /// Rows of the sky that are computed.
+    moments: [Table; 4],
+    /// Rows and columns of the sky that are computed.
     sky_computed: Table,
-    /// The sky with further rows between those.
+    /// The sky with further columns between those.
+    sky_columns: Table,
+    /// The same with further rows.
     sky: Table,
     /// Light and depths of the air before things, and the pass that makes them.
     before: Option<Before>,
     bake_columns: Bake,
     bake_moments: Vec<Bake>,
-    bake_sky: [Bake; 2],
+    bake_sky: [Bake; 3],
     /// What the buffer `air` holds.
     air_bytes: Vec<u8>,
     /// What the buffer `eye` holds.
@@ -397,9 +428,19 @@ impl SkyTables {
         // A second layer for lanes 4 to 7 is there in any case: eight lanes are a matter of content.
         let columns = Table::new(device, "veduta columns", quality.columns, Some(2));
         let moments =
-            [1, 2, 3].map(|_| Table::new(device, "veduta diffuse light", quality.diffuse, Some(3)));
-        let sky_computed = Table::new(device, "veduta sky", quality.sky, Some(2));
-        let fine = [quality.sky[0], quality.sky[1] * ROWS_OF_EACH];
+            [(); 4].map(|()| Table::new(device, "veduta diffuse light", quality.diffuse, Some(3)));
+        let fine = fine_size(quality);
+        let between = [fine[0], quality.sky[1]];
+        // Whole floats, since rounding would be carried on between rows and columns.
+        let float = wgpu::TextureFormat::Rgba32Float;
+        let sky_computed = Table::of(device, "veduta sky", float, quality.sky, Some(2));
+        let sky_columns = Table::of(
+            device,
+            "veduta sky between its columns",
+            float,
+            between,
+            Some(2),
+        );
         let sky = Table::new(device, "veduta sky between its rows", fine, Some(2));
         let air_bound = (0, air.as_entire_binding());
         let eye_bound = (1, eye.as_entire_binding());
@@ -422,9 +463,15 @@ impl SkyTables {
             workgroups: groups_of(quality.columns, [8, 8]),
         };
         let mut bake_moments = Vec::new();
-        // The first order reads no other; the others read the one before, the third both. What is not read is any table but the one written.
-        for (order, [before, earlier, written]) in [(1, [1, 2, 0]), (2, [0, 2, 1]), (3, [1, 0, 2])]
-        {
+        // The first order reads no other, the second the first; the last reads the order before and the sum of those before that. Orders between, in pairs, read and write the
+        // same. What is not read is any table but those written.
+        for (order, [before, earlier, written, sums]) in [
+            (1, [1, 2, 0, 3]),
+            (2, [0, 2, 1, 3]),
+            (4, [1, 0, 2, 3]),
+            (4, [2, 3, 1, 0]),
+            (3, [1, 0, 2, 3]),
+        ] {
             let (pipeline, layouts) = compute(
                 device,
                 programs,
@@ -446,7 +493,7 @@ impl SkyTables {
                             at(2, &moments[before]),
                             at(3, &moments[earlier]),
                         ],
-                        &[at(0, &moments[written])],
+                        &[at(0, &moments[written]), at(1, &moments[sums])],
                     ],
                 ),
                 workgroups: groups_of(quality.diffuse, [4, 4]),
@@ -479,8 +526,19 @@ impl SkyTables {
             ),
             workgroups: groups_of(quality.sky, [8, 8]),
         };
+        let (pipeline, layouts) = compute(device, programs, atmosphere, "sky_columns", &[])?;
+        let refine_columns = Bake {
+            pipeline,
+            groups: bind_groups(
+                device,
+                "veduta sky between its columns",
+                &layouts,
+                &[&[], &[at(0, &sky_computed)], &[at(0, &sky_columns)]],
+            ),
+            workgroups: groups_of(quality.sky, [8, 8]),
+        };
         let (pipeline, layouts) = compute(device, programs, atmosphere, "sky_refine", &[])?;
-        let refine_sky = Bake {
+        let refine_rows = Bake {
             pipeline,
             groups: bind_groups(
                 device,
@@ -488,11 +546,11 @@ impl SkyTables {
                 &layouts,
                 &[
                     std::slice::from_ref(&eye_bound),
-                    &[at(0, &sky_computed)],
+                    &[at(0, &sky_columns)],
                     &[at(0, &sky)],
                 ],
             ),
-            workgroups: groups_of(fine, [8, 8]),
+            workgroups: groups_of(between, [8, 8]),
         };
         let before = if before {
             let [width, height] = quality.aerial;
@@ -549,11 +607,12 @@ impl SkyTables {
             columns,
             moments,
             sky_computed,
+            sky_columns,
             sky,
             before,
             bake_columns,
             bake_moments,
-            bake_sky: [bake_sky, refine_sky],
+            bake_sky: [bake_sky, refine_columns, refine_rows],
             air_bytes: Vec::new(),
             eye_bytes: Vec::new(),
             look_bytes: Vec::new(),
@@ -689,8 +748,12 @@ impl SkyTables {
         let air_anew = self.moments_of.as_ref() != Some(&self.air_bytes);
         if air_anew {
             if self.quality.all_orders {
-                for pass in &self.bake_moments {
-                    pass.record(encoder, "veduta diffuse light", &mut work);
+                if let [first, second, between @ .., last] = &self.bake_moments[..] {
+                    let pairs = pairs_between(&self.atmosphere);
+                    let between = (0..pairs).flat_map(|_| between);
+                    for pass in [first, second].into_iter().chain(between).chain([last]) {
+                        pass.record(encoder, "veduta diffuse light", &mut work);
+                    }
                 }
             }
             self.moments_of = Some(self.air_bytes.clone());
@@ -719,8 +782,7 @@ impl SkyTables {
     }
 
     fn look_block(&self, eye: &EyeBlock) -> LookBlock {
-        let [width, rows] =
-            [self.quality.sky[0], self.quality.sky[1] * ROWS_OF_EACH].map(f64::from);
+        let [width, rows] = fine_size(&self.quality).map(f64::from);
         let [sx, _, sz] = eye.to_sun.map(f64::from);
         let flat = sx.hypot(sz);
         let across = 0.5 * (width - 1.0) / width;
@@ -752,11 +814,16 @@ impl SkyTables {
     /// What the tables keep on the device.
     pub fn resources(&self) -> Resources {
         let before = self.before.as_ref();
-        let tables: Vec<&Table> = [&self.columns, &self.sky_computed, &self.sky]
-            .into_iter()
-            .chain(before.into_iter().flat_map(|b| [&b.light, &b.depths]))
-            .chain(&self.moments)
-            .collect();
+        let tables: Vec<&Table> = [
+            &self.columns,
+            &self.sky_computed,
+            &self.sky_columns,
+            &self.sky,
+        ]
+        .into_iter()
+        .chain(before.into_iter().flat_map(|b| [&b.light, &b.depths]))
+        .chain(&self.moments)
+        .collect();
         let bakes: Vec<&Bake> = std::iter::once(&self.bake_columns)
             .chain(&self.bake_sky)
             .chain(before.map(|b| &b.bake))
@@ -765,7 +832,7 @@ impl SkyTables {
         Resources {
             pipelines: bakes.len() as u32,
             bind_groups: bakes.iter().map(|b| b.groups.len() as u32).sum(),
-            bindings: 2 + 3 * 5 + 6 + 3 + if before.is_some() { 7 } else { 0 },
+            bindings: 2 + 5 * 6 + 6 + 2 + 3 + if before.is_some() { 7 } else { 0 },
             buffers: 3,
             buffer_bytes: self.air.size() + self.eye.size() + self.look.size(),
             textures: tables.len() as u32,
@@ -819,6 +886,27 @@ impl SkyTables {
         self.before.as_ref().map(|before| &before.depths.view)
     }
 }
+
+/// Pairs of orders of scattering between the second and the last: none for air through which light from the zenith is scattered at most half a time, and the more the
+/// thicker the air is, since the ratio of an order to the one before takes the longer to settle.
+fn pairs_between(atmosphere: &Atmosphere) -> usize {
+    let depth = |c: usize| -> f64 {
+        let layers = atmosphere.layers.iter();
+        let above = |layer: &super::Layer| {
+            // Dense at the ground.
+            let nodes = (0..256).map(|i| (f64::from(i) + 0.5) / 256.0);
+            let mean =
+                |x: f64| 2.0 * x * layer.profile.density(atmosphere.thickness * x * x) / 256.0;
+            nodes.map(mean).sum::<f64>() * atmosphere.thickness
+        };
+        layers.map(|layer| layer.scattering[c] * above(layer)).sum()
+    };
+    let depth = (0..3).map(depth).fold(0.0, f64::max);
+    (3.0 * (depth - 0.5)).ceil().clamp(0.0, MOST_PAIRS) as usize
+}
+
+/// Most pairs of orders between.
+const MOST_PAIRS: f64 = 16.0;
 
 /// What radiance in the tables of an eye is multiplied with, a power of two: so that half precision is enough from noon to night. It
 /// follows an estimate, in f64, of the brightest light that the eye sees scattered once.

@@ -846,8 +846,8 @@ fn a_still_frame_makes_nothing_anew() {
     let view = looking(100.0, [0.0, 10.0, 60.0], [30.0, 40.0]);
     assert_eq!(
         work(&view),
-        (6, 6, 4),
-        "the air's four tables, the eye's sky and the rows between its rows"
+        (7, 7, 4),
+        "the air's four tables, the eye's sky and the columns and rows between its own"
     );
     assert_eq!(work(&view), (0, 0, 0), "still");
     let turned = looking(100.0, [70.0, -20.0, 40.0], [30.0, 40.0]);
@@ -857,10 +857,10 @@ fn a_still_frame_makes_nothing_anew() {
     assert_eq!(work(&moved), (0, 0, 0), "elsewhere at this altitude");
     let later = looking(100.0, [70.0, -20.0, 40.0], [31.0, 40.0]);
     let (bakes, dispatches, writes) = work(&later);
-    assert_eq!((bakes, dispatches), (2, 2), "another sun");
+    assert_eq!((bakes, dispatches), (3, 3), "another sun");
     assert!(writes <= 3);
     let higher = looking(200.0, [70.0, -20.0, 40.0], [31.0, 40.0]);
-    assert_eq!(work(&higher).0, 2, "another altitude");
+    assert_eq!(work(&higher).0, 3, "another altitude");
 }
 
 #[test]
@@ -1339,11 +1339,11 @@ fn arcs_of_the_sky_are_as_smooth_as_the_reference() {
     factors.sort_by(|a, b| b.0.total_cmp(&a.0));
     let failing = factors.iter().filter(|f| f.0 > 2.0).count();
     println!("{failing} of {} arcs above 2", factors.len());
-    // What is left are the two along the horizon under a sun that touches it.
-    assert!(factors.iter().all(|f| f.0.is_finite()) && failing <= 2);
     for (factor, arc) in factors.iter().take(failing.max(4)) {
         println!("{factor:8.2}  {arc}");
     }
+    // What is left are the two along the horizon under a sun that touches it.
+    assert!(factors.iter().all(|f| f.0.is_finite()) && failing <= 2);
 }
 
 /// Pictures of the tables of `Sky`, which show the ground and share reads between pixels (`sky_seen_by_pair`, and `sky_seen` where nothing is shared), against rays read from tables of the finest quality.

@@ -113,7 +113,7 @@ fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
     return Moments(whole, up * over, level * over, aside / max(dot(whole, vec3<f32>(1.0)), 1e-30));
 }
 
-/// Light of all orders from the third on, when `last` is the light of the third order and `before` that of the second: a geometric series, whose ratio is at most 0.95.
+/// Light of all orders from one on, when `last` is its light and `before` that of the order before: a geometric series, whose ratio is at most 0.95.
 ///
 /// domain  before.whole in [0, 10] 1 lin
 /// domain  last.whole in [0, 10] 1 lin

@@ -5,7 +5,7 @@
 //! The first rows hold directions above the horizon, the others those below: the last quarter, or half where `sky_coded`.
 //!
 //! A texel holds radiance for a sun of irradiance 1, over the reach of its direction and times the scale of the eye (where `sky_coded`, a code of that): layer 0 but for peaked light, over 1 + nu^2, the shape
-//! of molecules' phase function [1/sr], layer 1 peaked light over the peaked phase function [1]. Rows between those that are computed are cubics through four of them.
+//! of molecules' phase function [1/sr], layer 1 peaked light over the peaked phase function [1]. Rows and columns between those that are computed are cubics through four of them.
 #define_import_path veduta::atmosphere::sky_view
 
 #import veduta::atmosphere::ray::{tangent_altitude}

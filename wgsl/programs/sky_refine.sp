@@ -1,5 +1,5 @@
-The table of the sky that pictures read: between the rows that `sky_view` has computed lie others, on cubics through the four nearest, so that no line between two
-of them has a bend that the eye sees as a stripe. Rows above the horizon and below it never mix.
+The table of the sky that pictures read: between the rows of `sky_columns` lie others, on cubics through the four nearest, so that no line between two
+of them has a bend that the eye sees as a stripe. Rows above the horizon and below it never mix. One invocation makes all that lie between two rows.
 
 #PROGRAM{ sky_refine }#
 
@@ -8,44 +8,52 @@ of them has a bend that the eye sees as a stripe. Rows above the horizon and bel
 #import veduta::atmosphere::sky_view::{SkyEye, sky_coded, sky_rows}
 
 @group(0) @binding(1) var<uniform> eye: SkyEye;
-@group(1) @binding(0) var computed: texture_2d_array<f32>;
+@group(1) @binding(0) var columns: texture_2d_array<f32>;
 @group(2) @binding(0) var sky: texture_storage_2d_array<rgba16float, write>;
 
-// Lagrange's weights of rows 0 to 3 for the place `x` among them.
-fn cubic(x: f32) -> vec4<f32> {
+// Weights of four rows, numbers 0 to 3, for the place `x` among them: Lagrange's, or of the two nearest where there are `few`.
+fn weights_at(x: f32, few: bool) -> vec4<f32> {
     let a = x - 1.0;
     let b = x - 2.0;
     let c = x - 3.0;
-    return vec4<f32>(a * b * c * -0.16666667, x * b * c * 0.5, x * a * c * -0.5, x * a * b * 0.16666667);
+    let line = max(1.0 - abs(vec4<f32>(x, a, b, c)), vec4<f32>(0.0));
+    return select(vec4<f32>(a * b * c * -0.16666667, x * b * c * 0.5, x * a * c * -0.5, x * a * b * 0.16666667), line, few);
 }
 
 @compute @workgroup_size(8, 8)
 fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
-    let size = textureDimensions(sky);
-    if id.x >= size.x || id.y >= size.y {
+    let size = vec2<i32>(textureDimensions(columns));
+    let column = i32(id.x);
+    if column >= size.x || i32(id.y) >= size.y {
         return;
     }
-    let rows = f32(textureDimensions(computed).y);
-    let fine_above = sky_rows(eye, f32(size.y));
-    let above = sky_rows(eye, rows);
-    let below = f32(id.y) >= fine_above;
-    let fine = select(fine_above, f32(size.y) - fine_above, below);
-    let count = select(above, rows - above, below);
-    let at = (f32(id.y) - select(0.0, fine_above, below)) / (fine - 1.0) * (count - 1.0);
-    let few = count < 4.0;
-    // Of fewer than four rows two are enough for a line.
-    let first = clamp(floor(at) - select(1.0, 0.0, few), 0.0, count - select(4.0, 2.0, few));
-    let share = at - first;
-    let weights = select(cubic(share), vec4<f32>(1.0 - share, share, 0.0, 0.0), few);
+    let fine_rows = f32(textureDimensions(sky).y);
+    let fine_above = i32(sky_rows(eye, fine_rows));
+    let above = i32(sky_rows(eye, f32(size.y)));
+    let below = i32(id.y) >= above;
+    let start = select(0, above, below);
+    let fine_start = select(0, fine_above, below);
+    let count = select(above, size.y - above, below);
+    let fine = select(fine_above, i32(fine_rows) - fine_above, below);
+    let row = i32(id.y) - start;
+    let few = count < 4;
+    let first = clamp(row - select(1, 0, few), 0, count - select(4, 2, few));
+    // From this row on and before the next; the last row holds itself.
+    let from_row = (row * (fine - 1) + count - 2) / (count - 1);
+    let to_row = min(((row + 1) * (fine - 1) + count - 2) / (count - 1), fine);
+    let rise = f32(count - 1) / f32(fine - 1);
     let coded = sky_coded(eye);
     for (var layer = 0; layer < 2; layer++) {
-        var sum = vec3<f32>(0.0);
-        for (var k = 0; k < 4; k++) {
-            let row = min(first + f32(k), count - 1.0) + select(0.0, above, below);
-            sum += textureLoad(computed, vec2<i32>(i32(id.x), i32(row)), layer, 0).rgb * weights[k];
+        let a = textureLoad(columns, vec2<i32>(column, start + first), layer, 0).rgb;
+        let b = textureLoad(columns, vec2<i32>(column, start + first + 1), layer, 0).rgb;
+        let c = textureLoad(columns, vec2<i32>(column, start + min(first + 2, count - 1)), layer, 0).rgb;
+        let d = textureLoad(columns, vec2<i32>(column, start + min(first + 3, count - 1)), layer, 0).rgb;
+        for (var k = from_row; k < to_row; k++) {
+            let weights = weights_at(f32(k) * rise - f32(first), few);
+            let sum = a * weights.x + b * weights.y + c * weights.z + d * weights.w;
+            // Light is not negative; codes may be.
+            textureStore(sky, vec2<i32>(column, fine_start + k), layer, vec4<f32>(select(max(sum, vec3<f32>(0.0)), sum, coded), 1.0));
         }
-        // Light is not negative; codes may be.
-        textureStore(sky, id.xy, layer, vec4<f32>(select(max(sum, vec3<f32>(0.0)), sum, coded), 1.0));
     }
 }
     }#

@@ -21,7 +21,7 @@ override SKY_GROUND: i32 = 0;
 @group(1) @binding(0) var linear: sampler;
 @group(1) @binding(1) var columns: texture_2d_array<f32>;
 @group(1) @binding(2) var moments: texture_2d_array<f32>;
-@group(2) @binding(0) var sky: texture_storage_2d_array<rgba16float, write>;
+@group(2) @binding(0) var sky: texture_storage_2d_array<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
