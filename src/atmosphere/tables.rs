@@ -747,13 +747,13 @@ impl SkyTables {
         }
         let air_anew = self.moments_of.as_ref() != Some(&self.air_bytes);
         if air_anew {
-            if self.quality.all_orders {
-                if let [first, second, between @ .., last] = &self.bake_moments[..] {
-                    let pairs = pairs_between(&self.atmosphere);
-                    let between = (0..pairs).flat_map(|_| between);
-                    for pass in [first, second].into_iter().chain(between).chain([last]) {
-                        pass.record(encoder, "veduta diffuse light", &mut work);
-                    }
+            if self.quality.all_orders
+                && let [first, second, between @ .., last] = &self.bake_moments[..]
+            {
+                let pairs = pairs_between(&self.atmosphere);
+                let between = (0..pairs).flat_map(|_| between);
+                for pass in [first, second].into_iter().chain(between).chain([last]) {
+                    pass.record(encoder, "veduta diffuse light", &mut work);
                 }
             }
             self.moments_of = Some(self.air_bytes.clone());
