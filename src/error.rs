@@ -45,6 +45,14 @@ pub enum Error {
         /// The nearest declared name.
         nearest: Option<String>,
     },
+    /// A file that holds no height map.
+    #[error("the height map {file}: {what}")]
+    HeightMap {
+        /// The file.
+        file: String,
+        /// What is wrong with it.
+        what: String,
+    },
     /// No preset has this name.
     #[error("no preset is called `{name}`; the set holds {}", list(.known))]
     UnknownPreset {

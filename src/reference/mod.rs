@@ -23,6 +23,7 @@ pub mod planet;
 pub mod post;
 pub mod probe;
 pub mod quadrature;
+pub mod relief;
 pub mod sky;
 pub mod sky_paths;
 pub mod terrain;

@@ -221,7 +221,7 @@ pub fn tails(field: &HeightField) -> Tails {
                 lost: sum(mean_square, ratio),
             };
         }
-        Kind::Fbm => {
+        Kind::Fbm | Kind::Map => {
             let lost = Tail {
                 total: series(octaves, 1.0),
                 first: mean_square,

@@ -1,8 +1,9 @@
 //! Baked heights around the eye, made anew only where the eye has uncovered ground.
 
-use super::field::HeightField;
+use super::field::{HeightField, Kind};
 use super::ground::Prepared;
 use super::land::Land;
+use super::map::Relief;
 use crate::error::Error;
 use crate::exchange::compute;
 use crate::landscape::{Resources, Work};
@@ -124,6 +125,28 @@ struct Span {
     to: [i64; 2],
 }
 
+/// Distance from an eye to the nearest ground (m), about, from heights below it and around it, wherever it looks; 1 for a program's own function.
+pub(super) fn nearest_ground(field: &Prepared<f32>, eye: WorldPos) -> f64 {
+    let below = eye.altitude() - f64::from(field.ground(eye, 0.0).height);
+    if below.is_nan() {
+        return 1.0;
+    }
+    // Nothing farther off than the ground below can be nearer.
+    let (place, reach) = (field.place(eye), below.abs());
+    let mut nearest = reach;
+    for i in 0..16 {
+        let (sine, cosine) = (std::f64::consts::TAU * f64::from(i) / 16.0).sin_cos();
+        for share in [0.15, 0.3, 0.5, 0.75] {
+            let d = share * reach;
+            let at = [cosine * d, sine * d].map(|c| c as f32);
+            let ground = field.ground_from(place, at, (0.1 * d) as f32);
+            let rise = eye.altitude() - f64::from(ground.height);
+            nearest = nearest.min(d.hypot(rise));
+        }
+    }
+    nearest
+}
+
 /// What of the new window the old one does not cover: at most two rectangles.
 fn uncovered(old: Option<Window>, new: Window, size: i64) -> Vec<Span> {
     let whole = Span {
@@ -178,7 +201,9 @@ pub struct Clipmap {
     bake: wgpu::ComputePipeline,
     sweep: wgpu::ComputePipeline,
     rectangles: Vec<Slot>,
+    bake_source: wgpu::BindGroup,
     bake_target: wgpu::BindGroup,
+    relief: Relief,
     sweep_groups: [wgpu::BindGroup; 3],
     /// Heights, tangents by sector and ring, places of the levels.
     pub(super) views: [wgpu::TextureView; 3],
@@ -225,7 +250,12 @@ pub(super) fn group(
 
 /// Spacing of the finest level that a field can use: an eighth of its finest cells, a power of two.
 fn finest(field: &HeightField) -> f64 {
-    let cells = f64::from(field.wavelength as f32) / f64::from(field.octaves - 1).exp2();
+    let last = match field.kind {
+        // A map without detail.
+        Kind::Map if field.amplitude == 0.0 => 0,
+        _ => field.octaves - 1,
+    };
+    let cells = f64::from(field.wavelength as f32) / f64::from(last).exp2();
     (cells / 8.0).log2().floor().clamp(-4.0, 10.0).exp2()
 }
 
@@ -266,6 +296,7 @@ impl Clipmap {
             .max(needed / f64::from(options.levels - 1).exp2())
             .min(needed);
         let levels = (needed / spacing).log2().round() as usize + 1;
+        let relief = Relief::new(device, field.map())?;
         let kind = [("FIELD_KIND", f64::from(land.field.kind.number()))];
         let (bake, bake_layouts) = compute(device, programs, "terrain_bake", &[], &kind)?;
         let (sweep, sweep_layouts) =
@@ -419,7 +450,9 @@ impl Clipmap {
             bake,
             sweep,
             rectangles,
+            bake_source: group(device, &bake_layouts[1], &[view(&relief.view)]),
             bake_target: group(device, &bake_layouts[2], &[view(&heights)]),
+            relief,
             sweep_groups,
             views: [heights, sectors, places_view],
             sectors: [count as i32, 0, 0],
@@ -448,6 +481,11 @@ impl Clipmap {
         self.shades.as_ref().map(|s| &s.view)
     }
 
+    /// The field's height map.
+    pub(super) fn relief(&self) -> &wgpu::TextureView {
+        &self.relief.view
+    }
+
     /// The uniform `Clip`.
     pub(super) fn clip(&self) -> &wgpu::Buffer {
         &self.clip
@@ -468,16 +506,20 @@ impl Clipmap {
         let shades = 2 * level * if shaded == 0 { 0 } else { shaded.max(2) as u64 };
         Resources {
             pipelines: 2 + u32::from(shaded > 0),
-            bind_groups: slots + 4 + 3 * shaded as u32,
-            bindings: slots + 6 + 5 * shaded as u32,
+            bind_groups: slots + 5 + 3 * shaded as u32,
+            bindings: slots + 7 + 5 * shaded as u32,
             buffers: slots + 2 + shaded as u32,
             buffer_bytes: (self.rectangles.len() * RectangleBlock::SIZE
                 + ClipBlock::SIZE
                 + SweepBlock::SIZE
                 + shaded * ShadeBlock::SIZE) as u64,
             samplers: 1,
-            textures: 3 + u32::from(shaded > 0),
-            texture_bytes: level * self.levels as u64 + shades + sectors + 512,
+            textures: 4 + u32::from(shaded > 0),
+            texture_bytes: level * self.levels as u64
+                + shades
+                + sectors
+                + 512
+                + self.relief.bytes(),
         }
     }
 
@@ -490,6 +532,9 @@ impl Clipmap {
         gaze: &Gaze,
     ) -> Work {
         let mut work = Work::default();
+        let (writes, bytes) = self.relief.upload(queue);
+        work.writes += writes;
+        work.bytes += bytes;
         let mut moved = false;
         let eye = eye.normalized();
         self.first =
@@ -589,9 +634,9 @@ impl Clipmap {
             self.sectors[2] = (count + 2).min(all);
         }
         let count = self.sectors[2];
-        let scale = gaze
-            .near
-            .max(4.0 * self.spacing * (self.first as f64).exp2());
+        // No ring is wider than 32 texels near the eye, however high that is.
+        let texel = self.spacing * (self.first as f64).exp2();
+        let scale = gaze.near.min(32.0 * texel / width).max(4.0 * texel);
         let span = (gaze.far.min(self.reach() * std::f64::consts::SQRT_2) / scale).asinh();
         let growth = width.max(span / f64::from(RINGS));
         let clip = ClipBlock {
@@ -639,6 +684,7 @@ impl Clipmap {
         }
         let mut pass = encoder.begin_compute_pass(&Default::default());
         pass.set_pipeline(&self.bake);
+        pass.set_bind_group(1, &self.bake_source, &[]);
         pass.set_bind_group(2, &self.bake_target, &[]);
         for (slot, size) in &jobs {
             pass.set_bind_group(0, &self.rectangles[*slot].group, &[]);

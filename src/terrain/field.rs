@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::calibrate;
 use super::ground::Prepared;
+use super::map::HeightMap;
 use super::real::Real;
 use crate::error::Error;
 
@@ -66,6 +67,8 @@ pub enum Kind {
         /// Handed on as the terrain's smoothness.
         smoothness: f64,
     },
+    /// The field's height map, with an fBm as detail: the wavelength is the width of a texel, the amplitude is that of the detail; 0 leaves it out.
+    Map,
 }
 
 impl Kind {
@@ -79,13 +82,14 @@ impl Kind {
             Kind::Mix { .. } => 4,
             Kind::Own { .. } => 5,
             Kind::Mesa { .. } => 6,
+            Kind::Map => 7,
         }
     }
 
     /// Its two parameters.
     pub(super) fn parameters(self) -> [f64; 2] {
         match self {
-            Kind::Fbm => [0.0; 2],
+            Kind::Fbm | Kind::Map => [0.0; 2],
             Kind::Hybrid { offset } => [offset, 0.0],
             Kind::Ridged { gain, smoothness } | Kind::Own { gain, smoothness } => {
                 [gain, smoothness]
@@ -109,7 +113,7 @@ impl Kind {
 /// assert!((0.0..2800.0).contains(&ground.height));
 /// # Ok::<(), veduta::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeightField {
     /// What it is made of.
@@ -117,7 +121,7 @@ pub struct HeightField {
     /// Where it lies.
     #[serde(default)]
     pub domain: Domain,
-    /// Wavelength of the first octave (m), in [16, 1e6]; it is rounded to `f32`.
+    /// Wavelength of the first octave (m), in [16, 1e6]; it is rounded to `f32`. For `Map` the width of a texel, in [0.125, 1e6].
     pub wavelength: f64,
     /// Height of a value of 1 (m), in [0, 2e4].
     pub amplitude: f64,
@@ -131,6 +135,9 @@ pub struct HeightField {
     /// Seed of the lattice.
     #[serde(default)]
     pub seed: u32,
+    /// The height map of the kind `Map`; `None` for all others.
+    #[serde(default)]
+    pub map: Option<HeightMap>,
 }
 
 impl Default for HeightField {
@@ -148,6 +155,7 @@ impl Default for HeightField {
             octaves: 10,
             hurst: 1.0,
             seed: 1,
+            map: None,
         }
     }
 }
@@ -161,7 +169,7 @@ pub struct Bounds {
     pub maximum: f64,
     /// No slope is steeper (rise over run), where there is a slope.
     pub lipschitz: f64,
-    /// No octave adds a steeper slope.
+    /// No octave adds a steeper slope; what a height map adds is not among them.
     pub octaves: Vec<f64>,
 }
 
@@ -207,13 +215,17 @@ impl HeightField {
                 domain: format!("in [{low}, {high}]{unit}"),
             })
         };
-        within("wavelength", self.wavelength, 16.0, 1e6, " m")?;
+        let mapped = self.kind == Kind::Map;
+        let least = if mapped { 0.125 } else { 16.0 };
+        within("wavelength", self.wavelength, least, 1e6, " m")?;
         within("amplitude", self.amplitude, 0.0, 2e4, " m")?;
         within("base", self.base, -2e4, 2e4, " m")?;
         within("octaves", f64::from(self.octaves), 1.0, 16.0, "")?;
         within("hurst", self.hurst, 0.0, 2.0, "")?;
-        if let (Domain::Sphere, Kind::Mix { .. } | Kind::Own { .. } | Kind::Mesa { .. }) =
-            (self.domain, self.kind)
+        if let (
+            Domain::Sphere,
+            Kind::Mix { .. } | Kind::Own { .. } | Kind::Mesa { .. } | Kind::Map,
+        ) = (self.domain, self.kind)
         {
             return Err(Error::OutOfDomain {
                 name: "field.kind".to_owned(),
@@ -221,8 +233,16 @@ impl HeightField {
                 domain: "Fbm, Hybrid, Ridged or Craters on a Sphere".to_owned(),
             });
         }
+        if mapped != self.map.is_some() {
+            return Err(Error::OutOfDomain {
+                name: "field.map".to_owned(),
+                value: if mapped { "None" } else { "Some" }.to_owned(),
+                domain: "a height map for the kind Map, and None for all others".to_owned(),
+            });
+        }
         match self.kind {
             Kind::Fbm => Ok(()),
+            Kind::Map => self.map.as_ref().map_or(Ok(()), HeightMap::check),
             Kind::Hybrid { offset } => within("kind.offset", offset, 0.0, 1.0, ""),
             Kind::Ridged { gain, smoothness } | Kind::Own { gain, smoothness } => {
                 within("kind.gain", gain, 0.0, 4.0, "")?;
@@ -262,7 +282,7 @@ impl HeightField {
     /// The field with all that follows from its numbers, in `f32` as the device computes it, or in `f64`.
     ///
     /// # Errors
-    /// As [`HeightField::check`]; [`Error::OutOfDomain`] on a `Sphere`, which `Land::globe` prepares, since it needs the planet's radius.
+    /// As [`HeightField::check`]; [`Error::OutOfDomain`] on a `Sphere`, which `Land::globe` prepares, since it needs the planet's radius, and for a height map that has not been read.
     pub fn prepare<T: Real>(&self) -> Result<Prepared<T>, Error> {
         self.check()?;
         if self.domain != Domain::Plane {
@@ -272,13 +292,17 @@ impl HeightField {
                 domain: "Plane; Land::globe takes a Sphere".to_owned(),
             });
         }
-        Ok(Prepared::new(self, &calibrate::tails(self)))
+        let map = match &self.map {
+            Some(map) => Some(map.pyramid(self.lattice_wavelength())?),
+            None => None,
+        };
+        Ok(Prepared::new(self, &calibrate::tails(self), map))
     }
 
     /// What holds everywhere on it, by interval arithmetic from octave to octave.
     ///
     /// # Errors
-    /// As [`HeightField::check`]; [`Error::OutOfDomain`] for a program's own function, of which nothing is known.
+    /// As [`HeightField::check`]; [`Error::OutOfDomain`] for a program's own function, of which nothing is known, and for a height map that has not been read.
     pub fn bounds(&self) -> Result<Bounds, Error> {
         self.check()?;
         let fall = |i: u32| (-self.hurst * f64::from(i)).exp2();
@@ -290,7 +314,7 @@ impl HeightField {
             Domain::Sphere => (NOISE_SLOPE_3D, 8.0, 8.0, 0.35),
         };
         match self.kind {
-            Kind::Fbm => {
+            Kind::Fbm | Kind::Map => {
                 let (sum, each) = fbm_bounds(self.octaves, self.hurst, 1.0, steep_noise);
                 (values, slopes) = ([-sum, sum], each);
             }
@@ -355,10 +379,17 @@ impl HeightField {
         }
         let steepness = self.amplitude / self.lattice_wavelength();
         let octaves: Vec<f64> = slopes.iter().map(|s| s * steepness).collect();
+        let [low, high, steep] = match &self.map {
+            Some(map) => {
+                let pyramid = map.pyramid(self.lattice_wavelength())?;
+                [pyramid.minimum, pyramid.maximum, pyramid.lipschitz]
+            }
+            None => [0.0; 3],
+        };
         Ok(Bounds {
-            minimum: self.base + self.amplitude * values[0],
-            maximum: self.base + self.amplitude * values[1],
-            lipschitz: octaves.iter().sum(),
+            minimum: self.base + low + self.amplitude * values[0],
+            maximum: self.base + high + self.amplitude * values[1],
+            lipschitz: steep + octaves.iter().sum::<f64>(),
             octaves,
         })
     }

@@ -76,7 +76,7 @@ impl Land {
         bounds.minimum = bounds.minimum.max(sea);
         bounds.maximum = bounds.maximum.max(sea);
         Ok(Globe {
-            field: Prepared::new(&self.field, &calibrate::tails(&self.field)),
+            field: Prepared::new(&self.field, &calibrate::tails(&self.field), None),
             radius: self.planet_radius,
             sea,
             bounds,

@@ -1,7 +1,10 @@
 //! The field at a place, in the device's order of operations.
 
+use std::sync::Arc;
+
 use super::calibrate::Tails;
 use super::field::{HeightField, Kind};
+use super::map::Pyramid;
 use super::noise::{Place, craters, gradient_noise, octave_seed};
 use super::real::Real;
 use crate::view::WorldPos;
@@ -88,12 +91,15 @@ fn strata<T: Real>(value: T, period: T, hardness: T, variance: T) -> [T; 3] {
 }
 
 /// A field with all that follows from its numbers. In `f32` it does what the device does, operation by operation; see [`HeightField::prepare`].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Prepared<T> {
     kind: Kind,
     octaves: i32,
     seed: u32,
     lattice: f64,
+    /// Place of the lattice's origin (x, z) (m).
+    origin: [f64; 2],
+    map: Option<Arc<Pyramid>>,
     /// Wavelength of the lattice (m).
     pub(super) wavelength: T,
     pub(super) amplitude: T,
@@ -107,14 +113,25 @@ pub struct Prepared<T> {
 }
 
 impl<T: Real> Prepared<T> {
-    pub(super) fn new(field: &HeightField, tails: &Tails) -> Prepared<T> {
-        let [shape, detail] = field.kind.parameters();
+    pub(super) fn new(
+        field: &HeightField,
+        tails: &Tails,
+        map: Option<Arc<Pyramid>>,
+    ) -> Prepared<T> {
+        let [mut shape, detail] = field.kind.parameters();
+        if let Some(map) = &map {
+            shape = f64::from(map.edge.number());
+        }
+        // Detail without height takes no rounds.
+        let plain = map.is_some() && field.amplitude == 0.0;
         let four = |t: &super::calibrate::Tail| [t.total, t.first, t.ratio, t.bend].map(T::of);
         Prepared {
             kind: field.kind,
-            octaves: field.octaves as i32,
+            octaves: if plain { 0 } else { field.octaves as i32 },
             seed: field.seed,
             lattice: field.lattice_wavelength(),
+            origin: field.map.as_ref().map_or([0.0; 2], |m| m.origin),
+            map,
             wavelength: T::of(field.lattice_wavelength()),
             amplitude: T::of(field.amplitude),
             base: T::of(field.base),
@@ -144,7 +161,10 @@ impl<T: Real> Prepared<T> {
     /// Where a position lies on the field's lattice, exact to the last place of the fraction at any distance from the origin.
     pub fn place(&self, position: WorldPos) -> Place<T> {
         const UNIT: f64 = (1_u64 << 20) as f64;
-        let p = position.normalized();
+        let mut p = position.normalized();
+        if self.origin != [0.0; 2] {
+            p = p.moved_by([-self.origin[0], 0.0, -self.origin[1]].into());
+        }
         let period = (self.lattice * UNIT).round() as i128;
         let axis = |axis: usize| {
             let fraction = f64::from(p.frac[axis]) * UNIT;
@@ -154,7 +174,11 @@ impl<T: Real> Prepared<T> {
             let frac = T::of(rest / period as f64);
             // Rounding may reach 1, which is the next cell.
             let over = frac >= T::of(1.0);
-            let wrapped = (cell + i128::from(over)).rem_euclid(1 << 32) as u32;
+            let mut cell = cell + i128::from(over);
+            if let Some(map) = &self.map {
+                cell = map.reduced(cell, axis / 2);
+            }
+            let wrapped = cell.rem_euclid(1 << 32) as u32;
             let frac = if over { T::of(0.0) } else { frac };
             (wrapped.cast_signed(), frac)
         };
@@ -176,8 +200,22 @@ impl<T: Real> Prepared<T> {
         self.ground_at(Place::new(eye.cell, frac), footprint)
     }
 
+    /// The pyramid of a height map.
+    pub(super) fn map(&self) -> Option<Arc<Pyramid>> {
+        self.map.clone()
+    }
+
     /// The field at a place on its lattice.
     pub fn ground_at(&self, place: Place<T>, footprint: T) -> Ground<T> {
+        if let Some(map) = &self.map {
+            let detail = self.octave_sum(place, footprint);
+            let map = map.ground(place, self.wavelength, footprint);
+            return Ground {
+                height: map.height + detail.height,
+                slope: [0, 1].map(|k| map.slope[k] + detail.slope[k]),
+                lost: map.lost + detail.lost,
+            };
+        }
         match self.kind {
             Kind::Own { .. } => {
                 let none = T::of(f64::NAN);

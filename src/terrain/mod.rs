@@ -11,6 +11,9 @@ mod ground;
 #[cfg(feature = "reference")]
 mod judge;
 mod land;
+mod map;
+#[cfg(feature = "height_maps")]
+mod map_file;
 mod noise;
 mod noise_3d;
 mod probe;
@@ -28,6 +31,7 @@ pub use ground::{Ground, Prepared};
 #[cfg(feature = "reference")]
 pub use judge::{HitErrors, hit_errors};
 pub use land::{Land, Material, Sea};
+pub use map::{Edge, HeightMap, MapTexels};
 pub use noise::Place;
 pub use probe::heights;
 pub use rays::{RayPath, TerrainHit, TerrainRay, ray_hits};

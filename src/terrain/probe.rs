@@ -3,6 +3,7 @@
 use super::clipmap::group;
 use super::field::HeightField;
 use super::ground::{Ground, Prepared};
+use super::map::Relief;
 use super::noise::Place;
 use crate::device::Gpu;
 use crate::error::Error;
@@ -61,6 +62,8 @@ pub fn heights(
     let (device, queue) = (&gpu.device, &gpu.queue);
     let kind = [("FIELD_KIND", f64::from(field.kind.number()))];
     let (pipeline, layouts) = compute(device, programs, "terrain_heights", &[], &kind)?;
+    let mut relief = Relief::new(device, prepared.map())?;
+    let _ = relief.upload(queue);
     let block = prepared.block(Place {
         cell: [0; 2],
         frac: [0.0; 2],
@@ -83,11 +86,18 @@ pub fn heights(
             rows.extend([0; 4]);
         }
         let exchange = Exchange::new(device, queue, &rows, part.len() * RESULT);
-        let groups: Vec<wgpu::BindGroup> = layouts
-            .iter()
-            .zip([&uniform, &exchange.input, &exchange.output])
-            .map(|(layout, buffer)| group(device, layout, &[buffer.as_entire_binding()]))
-            .collect();
+        let groups = [
+            group(device, &layouts[0], &[uniform.as_entire_binding()]),
+            group(
+                device,
+                &layouts[1],
+                &[
+                    exchange.input.as_entire_binding(),
+                    wgpu::BindingResource::TextureView(&relief.view),
+                ],
+            ),
+            group(device, &layouts[2], &[exchange.output.as_entire_binding()]),
+        ];
         let encoder = device.create_command_encoder(&Default::default());
         let workgroups = part.len().div_ceil(64) as u32;
         let data = exchange.run(device, queue, encoder, &pipeline, &groups, workgroups)?;

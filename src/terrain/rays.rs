@@ -1,8 +1,9 @@
 //! Where rays meet a terrain: on the device, along both paths, and on the processor.
 
-use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group};
+use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group, nearest_ground};
 use super::ground::Prepared;
 use super::land::Land;
+use super::map::Relief;
 use super::real::Real;
 use crate::device::Gpu;
 use crate::error::Error;
@@ -123,6 +124,8 @@ pub fn ray_hits(
         None
     };
     let field = land.field.prepare::<f32>()?;
+    let mut relief = Relief::new(device, if fast { None } else { field.map() })?;
+    let _ = relief.upload(queue);
     let features: &[&str] = if fast { &["TERRAIN_FAST"] } else { &[] };
     let constants = [
         ("FIELD_KIND", f64::from(land.field.kind.number())),
@@ -172,10 +175,8 @@ pub fn ray_hits(
         }
         let exchange = Exchange::new(device, queue, &rows, 48 * count);
         let groups = if let Some(clipmap) = &mut clipmap {
-            let above = (eye.altitude() - f64::from(field.ground(eye, 0.0).height)).abs();
-            let above = if above.is_finite() { above } else { 1.0 };
+            let above = nearest_ground(&field, eye);
             let gaze = Gaze {
-                // As for pictures: nothing seen is much nearer than the ground below.
                 least: 0.35 * f64::from(pixel_angle) * above,
                 near: above,
                 far: farthest,
@@ -203,6 +204,7 @@ pub fn ray_hits(
                         view(sectors),
                         view(places),
                         wgpu::BindingResource::Sampler(&clipmap.wrapping),
+                        view(clipmap.relief()),
                     ],
                 ),
                 group(device, &layouts[2], &[exchange.output.as_entire_binding()]),
@@ -217,7 +219,14 @@ pub fn ray_hits(
                         planet_buffer.as_entire_binding(),
                     ],
                 ),
-                group(device, &layouts[1], &[exchange.input.as_entire_binding()]),
+                group(
+                    device,
+                    &layouts[1],
+                    &[
+                        exchange.input.as_entire_binding(),
+                        wgpu::BindingResource::TextureView(&relief.view),
+                    ],
+                ),
                 group(device, &layouts[2], &[exchange.output.as_entire_binding()]),
             ]
         };

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group};
+use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group, nearest_ground};
 use super::land::Land;
 use crate::error::Error;
 use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
@@ -268,6 +268,7 @@ impl PlaneTerrain {
                     texture(places),
                     texture(shades),
                     wgpu::BindingResource::Sampler(&clipmap.wrapping),
+                    texture(clipmap.relief()),
                 ],
             ),
         ];
@@ -297,7 +298,7 @@ impl PlaneTerrain {
         Resources {
             pipelines: clipmap.pipelines + 1,
             bind_groups: clipmap.bind_groups + 2,
-            bindings: clipmap.bindings + 10,
+            bindings: clipmap.bindings + 11,
             buffers: clipmap.buffers + 3,
             buffer_bytes: clipmap.buffer_bytes
                 + (ViewBlock::SIZE + FieldBlock::SIZE + RockBlock::SIZE) as u64,
@@ -339,14 +340,13 @@ impl PlaneTerrain {
         }
         let pixel_angle = 2.0 * up.length() / rows as f32;
         let eye = view.eye.normalized();
-        let field = *self.clipmap.field();
-        // Nothing seen is much nearer than the ground below; a level finer than a pixel there would not be used. NaN for a program's own function.
-        let clearance = eye.altitude() - f64::from(field.ground(eye, 0.0).height);
-        let nearest = if clearance.is_nan() { 0.0 } else { clearance };
+        let field = self.clipmap.field().clone();
+        // A level finer than a pixel on the nearest ground would not be used.
+        let nearest = nearest_ground(&field, eye);
         let far = self.far.min(self.clipmap.reach());
         let gaze = Gaze {
-            least: 0.35 * f64::from(pixel_angle) * nearest.max(0.0),
-            near: nearest.abs(),
+            least: 0.35 * f64::from(pixel_angle) * nearest,
+            near: nearest,
             far,
             azimuths: azimuths([middle, right, up]),
             sun: (lights.sun != Vec3::ZERO).then(|| {

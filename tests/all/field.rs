@@ -377,7 +377,7 @@ fn files_make_fields_and_faults_name_what_is_wrong() {
     let good = HeightField::default();
     let bad = fault(HeightField {
         wavelength: f64::NAN,
-        ..good
+        ..good.clone()
     });
     assert!(
         bad.contains("field.wavelength") && bad.contains("NaN"),
@@ -385,12 +385,12 @@ fn files_make_fields_and_faults_name_what_is_wrong() {
     );
     let bad = fault(HeightField {
         kind: Kind::Mix { mountains: 2.5 },
-        ..good
+        ..good.clone()
     });
     assert!(bad.contains("mountains") && bad.contains("whole"), "{bad}");
     let bad = fault(HeightField {
         octaves: 17,
-        ..good
+        ..good.clone()
     });
     assert!(bad.contains("octaves") && bad.contains("[1, 16]"), "{bad}");
     assert!(

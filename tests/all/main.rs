@@ -17,6 +17,7 @@ mod globe;
 mod hash;
 mod land;
 mod landscape;
+mod map;
 mod noise;
 mod periodic;
 mod phase;

@@ -93,8 +93,9 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #FRAGMENT{
     #CODE{
 #import veduta::planet::shell::{altitude_of}
-#import veduta::terrain::clipmap::{Clip, Sweep, clip_hit, sun_share}
-#import veduta::terrain::field::{Field, ground_at}
+#import veduta::terrain::clipmap::{Clip, Sweep, clip_hit, likely_distance, sun_share}
+#import veduta::terrain::field::{Field}
+#import veduta::terrain::relief::{land_at}
 #import veduta::terrain::refine::{refined_hit}
 #import veduta::terrain::material::{Rock, faded_noise, rock_low_faded, rock_high_faded, snow_blend}
 #import veduta::terrain::shading::{ThreeLights, shade_rough}
@@ -114,6 +115,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 @group(1) @binding(2) var places: texture_2d<f32>;
 @group(1) @binding(3) var shades: texture_2d_array<f32>;
 @group(1) @binding(4) var wrapping: sampler;
+@group(1) @binding(5) var relief: texture_2d<f32>;
 
 override FIELD_KIND: i32 = 2;
 override OUTPUT: i32 = 0;
@@ -149,18 +151,16 @@ fn draw(in: Corner) -> Shown {
     let dir = normalize(in.ray);
     let angle = draw_view.pixel_angle;
     let hit = clip_hit(heights, wrapping, sectors, places, clip, dir, draw_view.far, MAX_MARCHING_STEPS);
-    // A ray that ran out of steps close to the ground has almost met it.
-    let capped = hit.distance < 0.0 && hit.steps == MAX_MARCHING_STEPS && hit.clearance < 0.02 * hit.reached;
-    let met = select(hit.distance, hit.reached, capped);
+    let met = likely_distance(clip, dir, hit, draw_view.far, MAX_MARCHING_STEPS);
     // Where nothing is met the rest takes no rounds of any loop.
     let is_met = met >= 0.0;
     let pixel = select(1e30, angle, is_met);
-    let found = refined_hit(field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, vec3<f32>(0.0), dir, max(met, 1e-3), pixel, 2.0 * hit.spacing, select(0, REFINE_STEPS, is_met));
+    let found = refined_hit(relief, field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, vec3<f32>(0.0), dir, max(met, 1e-3), pixel, hit.slope, 2.0 * hit.spacing, select(0, REFINE_STEPS, is_met));
     let point = dir * found.distance;
     // A pixel covers more ground the more it slants.
-    let normal = normalize(vec3<f32>(-hit.slope.x, 1.0, -hit.slope.y));
+    let normal = normalize(vec3<f32>(-found.slope.x, 1.0, -found.slope.y));
     let footprint = select(1e30, angle * found.distance / max(-dot(normal, dir), 0.05), is_met);
-    let ground = ground_at(field, FIELD_KIND, point.xz, footprint);
+    let ground = land_at(relief, field, FIELD_KIND, point.xz, footprint);
     let altitude = altitude_of(clip.ground_radius, clip.eye_altitude, point);
     let light = sun_share(heights, shades, wrapping, places, clip, sweep, point.xz);
     let place = vec3<f32>(point.x, altitude, point.z);

@@ -151,7 +151,8 @@ fn darken(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 #else
-#import veduta::terrain::field::{Field, ground_at}
+#import veduta::terrain::field::{Field}
+#import veduta::terrain::relief::{land_at}
 
 override FIELD_KIND: i32 = 2;
 
@@ -167,6 +168,7 @@ struct Rectangle {
 }
 
 @group(0) @binding(0) var<uniform> rectangle: Rectangle;
+@group(1) @binding(0) var relief: texture_2d<f32>;
 @group(2) @binding(0) var heights: texture_storage_2d_array<r32float, write>;
 
 @compute @workgroup_size(8, 8)
@@ -175,7 +177,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     if any(at >= rectangle.size) {
         return;
     }
-    let ground = ground_at(rectangle.field, FIELD_KIND, vec2<f32>(at) * rectangle.spacing, rectangle.spacing);
+    let ground = land_at(relief, rectangle.field, FIELD_KIND, vec2<f32>(at) * rectangle.spacing, rectangle.spacing);
     let texel = (rectangle.corner + at) & vec2<i32>(rectangle.texels - 1);
     textureStore(heights, texel, rectangle.level, vec4<f32>(ground.height, 0.0, 0.0, 0.0));
 }

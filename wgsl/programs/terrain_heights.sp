@@ -4,7 +4,8 @@ Heights of given places of a terrain. Nothing is drawn; the host splits each pla
 
 #COMPUTE{
     #CODE{
-#import veduta::terrain::field::{Field, ground_at}
+#import veduta::terrain::field::{Field}
+#import veduta::terrain::relief::{land_at}
 
 override FIELD_KIND: i32 = 2;
 
@@ -22,6 +23,7 @@ struct GroundRow {
 
 @group(0) @binding(0) var<uniform> field: Field;
 @group(1) @binding(0) var<storage, read> places: array<PlaceRow>;
+@group(1) @binding(1) var relief: texture_2d<f32>;
 @group(2) @binding(0) var<storage, read_write> results: array<GroundRow>;
 
 @compute @workgroup_size(64)
@@ -33,7 +35,7 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     var here = field;
     here.cell = place.cell;
     here.frac = place.frac;
-    let ground = ground_at(here, FIELD_KIND, vec2<f32>(0.0), place.footprint);
+    let ground = land_at(relief, here, FIELD_KIND, vec2<f32>(0.0), place.footprint);
     results[id.x] = GroundRow(ground.height, ground.lost, ground.slope);
 }
     }#

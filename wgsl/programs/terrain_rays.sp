@@ -4,10 +4,11 @@ Where given rays meet a terrain, one invocation a ray: the textbook march, or th
 
 #COMPUTE{
     #CODE{
-#import veduta::terrain::field::{Field, ground_at}
+#import veduta::terrain::field::{Field}
+#import veduta::terrain::relief::{land_at}
 #import veduta::planet::shell::{altitude_of, up_at}
 #ifdef TERRAIN_FAST
-#import veduta::terrain::clipmap::{Clip, clip_hit}
+#import veduta::terrain::clipmap::{Clip, clip_hit, likely_distance}
 #import veduta::terrain::refine::{refined_hit}
 #endif
 
@@ -45,9 +46,11 @@ struct Planet {
 @group(1) @binding(2) var sectors: texture_2d<f32>;
 @group(1) @binding(3) var places: texture_2d<f32>;
 @group(1) @binding(4) var wrapping: sampler;
+@group(1) @binding(5) var relief: texture_2d<f32>;
 #else
 @group(0) @binding(1) var<uniform> planet: Planet;
 @group(1) @binding(0) var<storage, read> rays: array<RayRow>;
+@group(1) @binding(1) var relief: texture_2d<f32>;
 #endif
 @group(2) @binding(0) var<storage, read_write> results: array<HitRow>;
 
@@ -60,21 +63,20 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
 #ifdef TERRAIN_FAST
     let hit = clip_hit(heights, wrapping, sectors, places, clip, ray.dir, ray.far, MAX_MARCHING_STEPS);
     let capped = hit.steps == MAX_MARCHING_STEPS && hit.distance < 0.0;
-    // A ray that ran out of steps on its way down has almost met it.
-    let met = select(hit.distance, hit.reached, capped && hit.clearance < 0.05 * hit.reached);
-    let found = refined_hit(field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, ray.origin, ray.dir, max(met, 0.0), ray.pixel_angle, 2.0 * hit.spacing, REFINE_STEPS);
+    let met = likely_distance(clip, ray.dir, hit, ray.far, MAX_MARCHING_STEPS);
+    let found = refined_hit(relief, field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, ray.origin, ray.dir, max(met, 0.0), ray.pixel_angle, hit.slope, 2.0 * hit.spacing, REFINE_STEPS).distance;
     // The ground at the hit itself.
-    let at = ray.dir * max(found.distance, 0.0);
-    let ground = ground_at(field, FIELD_KIND, at.xz, ray.pixel_angle * max(found.distance, 0.0));
+    let at = ray.dir * max(found, 0.0);
+    let ground = land_at(relief, field, FIELD_KIND, at.xz, ray.pixel_angle * max(found, 0.0));
     let gradient = up_at(clip.ground_radius, clip.eye_altitude, at) - vec3<f32>(ground.slope.x, 0.0, ground.slope.y);
-    results[id.x] = HitRow(select(found.distance, -1.0, met < 0.0), normalize(gradient), ground.height, select(hit.steps, -1, capped));
+    results[id.x] = HitRow(select(found, -1.0, met < 0.0), normalize(gradient), ground.height, select(hit.steps, -1, capped));
 #else
     var t = 0.0;
     var distance = -1.0;
     var steps = -1;
     for (var i = 0; i < MAX_MARCHING_STEPS; i++) {
         let at = ray.origin + ray.dir * t;
-        let ground = ground_at(field, FIELD_KIND, at.xz, ray.pixel_angle * t);
+        let ground = land_at(relief, field, FIELD_KIND, at.xz, ray.pixel_angle * t);
         let clearance = altitude_of(planet.ground_radius, planet.eye_altitude, at) - ground.height;
         if clearance < MARCH_EPSILON * 0.001 * t {
             distance = t;
@@ -88,7 +90,7 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
         }
     }
     let at = ray.origin + ray.dir * max(distance, 0.0);
-    let ground = ground_at(field, FIELD_KIND, at.xz, ray.pixel_angle * max(distance, 0.0));
+    let ground = land_at(relief, field, FIELD_KIND, at.xz, ray.pixel_angle * max(distance, 0.0));
     let gradient = up_at(planet.ground_radius, planet.eye_altitude, at) - vec3<f32>(ground.slope.x, 0.0, ground.slope.y);
     results[id.x] = HitRow(distance, normalize(gradient), ground.height, steps);
 #endif

@@ -206,6 +206,26 @@ fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_
     return hit;
 }
 
+/// Distance at which a ray that ran out of steps most likely meets the ground; that of the hit if there is one, and -1 for what most likely is sky. A ray that is close to the ground has almost met
+/// it; one that would come down to the height of the ground below it meets it where it does.
+///
+/// internal
+fn likely_distance(clip: Clip, dir: vec3<f32>, hit: ClipHit, far: f32, max_steps: i32) -> f32 {
+    let radius = clip.ground_radius + clip.eye_altitude;
+    let t = hit.reached;
+    let q = t * (t + 2.0 * radius * dir.y);
+    let below = clip.eye_altitude + q / (radius + sqrt(max(radius * radius + q, 0.0))) - hit.clearance;
+    // Altitude of the place nearest to the planet's centre.
+    let square = dir.y * dir.y;
+    let lowest = clip.eye_altitude - radius * square / (1.0 + sqrt(max(1.0 - square, 0.0)));
+    let fall = -(dir.y + t / radius);
+    let close = hit.clearance < 0.02 * t;
+    let falls = fall > 0.0 && lowest < below;
+    let distance = t + select(max(hit.clearance, 0.0) / max(fall, 1e-3), 0.0, close);
+    let capped = hit.distance < 0.0 && hit.steps >= max_steps;
+    return select(hit.distance, select(-1.0, min(distance, far), close || falls), capped);
+}
+
 /// How the ground's shadow is swept: along the axis of the texels nearest to the sun's azimuth, on lines that keep to it.
 struct Sweep {
     /// Axis: 0 for x, 1 for z; the other is the side.

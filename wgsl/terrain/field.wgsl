@@ -27,6 +27,8 @@ const FIELD_CRATERS: i32 = 3;
 const FIELD_MIX: i32 = 4;
 const FIELD_OWN: i32 = 5;
 const FIELD_MESA: i32 = 6;
+/// An fBm, to which `veduta::terrain::relief` adds a height map.
+const FIELD_MAP: i32 = 7;
 
 /// A height field and where the eye is on it; the host makes it (`veduta::terrain::HeightField`).
 struct Field {
@@ -42,7 +44,7 @@ struct Field {
     base: f32,
     /// What the amplitude falls by from octave to octave.
     fall: f32,
-    /// Offset of the hybrid, gain of the ridged multifractal, share of cells with a crater, power of the mountains, or period of the strata.
+    /// Offset of the hybrid, gain of the ridged multifractal, share of cells with a crater, power of the mountains, period of the strata, or edge of the map.
     shape: f32,
     /// Rounding of the crests of the ridged multifractal; height of the noise between craters; hardness of the strata.
     detail: f32,
@@ -294,7 +296,7 @@ fn own_sum(field: Field, offset: vec2<f32>, footprint: f32) -> Ground {
     return Ground(field.base + middle, vec2<f32>(east - west, south - north) / (2.0 * width), 0.0);
 }
 
-/// The field at a place, filtered by the footprint. `kind` is one of the constants `FIELD_..`; given as an override it costs nothing.
+/// The field at a place, filtered by the footprint. `kind` is one of the constants `FIELD_..`; given as an override it costs nothing. Of `FIELD_MAP` this is the detail.
 ///
 /// domain  kind in [0, 4] 1 lin
 /// domain  offset in [-1e5, 1e5] m lin

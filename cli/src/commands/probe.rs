@@ -484,7 +484,11 @@ fn layer(args: &CloudsArgs) -> Result<(), CliError> {
 /// # Errors
 /// [`CliError::Read`], [`CliError::Table`] with the file and what is wrong in it, a name that does not exist.
 pub fn land(name: &str) -> Result<Land, CliError> {
-    named_or_file(name, Land::named, Land::from_ron)
+    let mut land = named_or_file(name, Land::named, Land::from_ron)?;
+    if let Some(map) = &mut land.field.map {
+        map.read(Path::new(name).parent().unwrap_or(Path::new("")))?;
+    }
+    Ok(land)
 }
 
 fn terrain(args: &TerrainArgs) -> Result<(), CliError> {

@@ -74,6 +74,14 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "rays_over_baked_heights_meet_the_field",
     ),
     (
+        "veduta::terrain::refine::refined_hit",
+        "rays_over_baked_heights_meet_the_field",
+    ),
+    (
+        "veduta::terrain::relief::land_at",
+        "the_device_and_the_processor_read_maps_alike",
+    ),
+    (
         "veduta::terrain::clipmap::sun_share",
         "the_sun_shines_where_the_ground_lets_it",
     ),
@@ -568,22 +576,6 @@ impl Answer for GlobeGround {
     fn values(self) -> Values {
         let [x, y, z] = self.slope;
         Values::new(&[self.height, x, y, z, self.lost])
-    }
-}
-
-impl Answer for field::Refined {
-    fn values(self) -> Values {
-        let ([x, y, z], [a, b]) = (self.normal, self.ground.slope);
-        Values::new(&[
-            self.distance,
-            x,
-            y,
-            z,
-            self.ground.height,
-            a,
-            b,
-            self.ground.lost,
-        ])
     }
 }
 
@@ -1669,25 +1661,6 @@ pub fn registry() -> Vec<Entry> {
         "globe::ground_from",
         |ball: Globe, kind: i32, at: [f64; 3], footprint: f64| {
             globe::ground_from(&ball, kind, at, footprint)
-        }
-    );
-    other!(
-        list,
-        "terrain::refine::refined_hit",
-        "field::refined",
-        |field: Field,
-         kind: i32,
-         radius: f64,
-         eye: f64,
-         origin: [f64; 3],
-         dir: [f64; 3],
-         t: f64,
-         pixel: f64,
-         most: f64,
-         steps: i32| {
-            field::refined(
-                &field, kind, radius, eye, origin, dir, t, pixel, most, steps,
-            )
         }
     );
     other!(
