@@ -3,7 +3,7 @@
 //! symbols  tangent of the elevation of a horizon · g slope of the ground along a sector
 #define_import_path veduta::terrain::sky_share
 
-#import veduta::terrain::clipmap::{Clip, baked_height}
+#import veduta::terrain::clipmap::{Clip, baked_height, level_of}
 
 /// Irradiance of a uniform sky over the baked ground, as a share of what a plane of the zenith cosine of the ground's normal has when that is all that counts (`normal.y`). In each sector the
 /// horizon is the highest of six heights, each 2.5 times as far as the one before it and from a level twice as fine as its distance, the ground's own plane, and the level.
@@ -29,7 +29,10 @@ fn sky_share(heights: texture_2d_array<f32>, wrapping: sampler, places: texture_
         var t = first;
         for (var k = 0; k < 6; k++) {
             let least = max((bitcast<i32>(0.5 * t / clip.spacing) >> 23u) - 127, 0);
-            tangent = max(tangent, (baked_height(heights, wrapping, places, clip, at + dir * t, least) - altitude) / t);
+            let there = at + dir * t;
+            let rise = (baked_height(heights, wrapping, places, clip, there, least) - altitude) / t;
+            // Beyond the coarsest level nothing is baked.
+            tangent = select(tangent, max(tangent, rise), level_of(clip, there) < clip.levels);
             t *= 2.5;
         }
         let square = 1.0 / (1.0 + tangent * tangent);
