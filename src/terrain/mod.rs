@@ -16,6 +16,8 @@ mod map;
 mod map_file;
 mod noise;
 mod noise_3d;
+#[cfg(feature = "reference")]
+mod picture;
 mod probe;
 mod rays;
 mod real;
@@ -33,6 +35,8 @@ pub use judge::{HitErrors, hit_errors};
 pub use land::{Land, Material, Sea};
 pub use map::{Edge, HeightMap, MapTexels};
 pub use noise::Place;
+#[cfg(feature = "reference")]
+pub use picture::{GroundPixel, land_picture};
 pub use probe::heights;
 pub use rays::{RayPath, TerrainHit, TerrainRay, ray_hits};
 pub use real::Real;

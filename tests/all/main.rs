@@ -10,6 +10,7 @@ mod depth;
 mod downstream;
 mod eval;
 mod examples;
+mod far;
 mod field;
 mod fractal;
 mod getting_started;
