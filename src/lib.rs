@@ -14,6 +14,7 @@ pub mod error;
 #[cfg(feature = "compose")]
 pub mod eval;
 mod exchange;
+pub mod ground;
 pub mod landscape;
 pub mod program;
 #[cfg(feature = "reference")]

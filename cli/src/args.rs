@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 
 use crate::commands;
 
-/// Outdoor landscapes for wgpu: render, sky, land, compose, lint, list, bench, cost, stress, diff, eval, probe.
+/// Outdoor landscapes for wgpu: render, sky, land, simulate, compose, lint, list, bench, cost, stress, diff, eval, probe.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "veduta", version, about, arg_required_else_help = true)]
 pub struct Args {
@@ -25,6 +25,8 @@ pub enum Command {
     Sky(commands::sky::SkyArgs),
     /// Draw a land under its sky
     Land(commands::land::LandArgs),
+    /// Let water run over a ground, dig and carry
+    Simulate(commands::simulate::SimulateArgs),
     /// Check modules, programs, presets, scenes and views; for continuous integration
     Lint(commands::lint::LintArgs),
     /// Show what there is: programs, presets, scenes, views, keys, adapters
@@ -53,6 +55,7 @@ impl Args {
             Command::Render(args) => commands::render::run(args),
             Command::Sky(args) => commands::sky::run(args),
             Command::Land(args) => commands::land::run(args),
+            Command::Simulate(args) => commands::simulate::run(args),
             Command::Compose(args) => commands::compose::run(args),
             Command::Lint(args) => commands::lint::run(args),
             Command::List(args) => commands::list::run(args),

@@ -332,6 +332,25 @@ pub fn read_cube(path: &Path) -> Result<([usize; 3], Vec<f32>), CliError> {
     Ok(([z as usize, y as usize, x as usize], numbers))
 }
 
+/// Writes an NPY file of `float32` with three dimensions in C order.
+///
+/// # Errors
+/// [`CliError::Write`].
+pub fn write_cube(path: &Path, shape: [usize; 3], numbers: &[f32]) -> Result<(), CliError> {
+    let fault = |e: std::io::Error| CliError::write(path, e);
+    let mut out = BufWriter::new(File::create(path).map_err(fault)?);
+    let shape = shape.map(|n| n as u64);
+    let mut writer = npyz::WriteOptions::new()
+        .default_dtype()
+        .shape(&shape)
+        .writer(&mut out)
+        .begin_nd()
+        .map_err(fault)?;
+    writer.extend(numbers.iter().copied()).map_err(fault)?;
+    writer.finish().map_err(fault)?;
+    out.flush().map_err(fault)
+}
+
 type Misfit = (String, &'static str);
 
 fn whole_number_needed(ty: Column) -> &'static str {

@@ -61,7 +61,19 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         "terrain_rays" | "terrain_globe_rays" => {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
-        "cloud_tile" => return vec![BTreeSet::new()],
+        "cloud_tile" | "ground_plan" | "ground_level" | "ground_shallow" | "ground_advance"
+        | "ground_query" => {
+            return vec![BTreeSet::new()];
+        }
+        "ground_edit" => {
+            return vec![BTreeSet::new(), BTreeSet::from(["GROUND_LEVEL".to_owned()])];
+        }
+        "ground_speeds" | "ground_transport" => {
+            return vec![
+                BTreeSet::new(),
+                BTreeSet::from(["GROUND_EROSION".to_owned()]),
+            ];
+        }
         "cloud_layer" | "cloud_probe" => {
             let flag = if program == "cloud_layer" {
                 "CLOUD_OVER_DEPTH"

@@ -11,6 +11,7 @@ pub mod clouds;
 pub mod field;
 pub mod fractal;
 pub mod globe;
+pub mod ground;
 pub mod hash;
 pub mod intersect;
 pub mod math;

@@ -15,6 +15,7 @@ mod field;
 mod fractal;
 mod getting_started;
 mod globe;
+mod ground;
 mod hash;
 mod land;
 mod landscape;

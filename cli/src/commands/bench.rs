@@ -6,7 +6,9 @@ use indicatif::ProgressBar;
 
 use crate::bench::knob::{self, Effect, Knob};
 use crate::bench::timing::{Clock, Rounds};
-use crate::bench::{Bench, baseline, chapter6, clouds, noise, presets, sky, terrain, write_text};
+use crate::bench::{
+    Bench, baseline, chapter6, clouds, ground, noise, presets, sky, terrain, write_text,
+};
 use crate::catalog::{Catalog, SourceArgs};
 use crate::commands::render::{RenderArgs, read_json, write_json};
 use crate::error::CliError;
@@ -32,6 +34,8 @@ pub enum Subject {
     Terrain,
     /// A layer of clouds at equal error, beside the loop of `thesis`.
     Clouds,
+    /// A step of the living ground.
+    Ground,
 }
 
 /// Arguments of `veduta bench`.
@@ -164,7 +168,8 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 | Subject::Noise
                 | Subject::Sky
                 | Subject::Terrain
-                | Subject::Clouds,
+                | Subject::Clouds
+                | Subject::Ground,
             ),
             Some(knob),
         ) => {
@@ -308,6 +313,19 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 write_json(
                     &path.with_extension("json"),
                     &noise::to_json(&bench, &rounds, &command),
+                )?;
+            }
+        }
+        Subject::Ground => {
+            let report = ground::run(&bench, rounds.least, &mut progress)?;
+            bar.finish_and_clear();
+            let text = ground::markdown(&bench, &report, &command);
+            print!("{text}");
+            if let Some(path) = &args.out {
+                write_text(path, &text)?;
+                write_json(
+                    &path.with_extension("json"),
+                    &ground::to_json(&bench, &report, &command),
                 )?;
             }
         }

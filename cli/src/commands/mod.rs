@@ -10,5 +10,6 @@ pub mod lint;
 pub mod list;
 pub mod probe;
 pub mod render;
+pub mod simulate;
 pub mod sky;
 pub mod stress;

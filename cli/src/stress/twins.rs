@@ -15,8 +15,8 @@ use veduta::reference::planet::{ShellSegment, Span};
 use veduta::reference::terrain::{Rock, Terrain, TerrainHit, ThreeLights};
 use veduta::reference::textbook::{self, AirLight};
 use veduta::reference::{
-    atmosphere, clouds, fractal, hash, math, medium, noise, phase, planet, post, quadrature,
-    terrain, tone_map,
+    atmosphere, clouds, fractal, ground, hash, math, medium, noise, phase, planet, post,
+    quadrature, terrain, tone_map,
 };
 use veduta_compose::header::{Bound, Interval, Spacing};
 
@@ -1755,6 +1755,90 @@ pub fn registry() -> Vec<Entry> {
         "terrain::terrain_normal",
         |land: Terrain, radius: f64, eye: f64, relative: [f64; 3], step: f64, octaves: i32| {
             terrain::terrain_normal(&land, radius, eye, relative, step, octaves)
+        }
+    );
+    let four = |f: &dyn Fn(usize) -> f64| -> [f64; 4] { std::array::from_fn(f) };
+    other!(
+        list,
+        "ground::flow::level_drop",
+        "ground::level_drop",
+        move |a: [f64; 4], b: [f64; 4], water: [f64; 4]| {
+            four(&|k| ground::level_drop(a[k], b[k], water[k]))
+        }
+    );
+    other!(
+        list,
+        "ground::flow::driven_speed",
+        "ground::driven_speed",
+        move |v: [f64; 4], drop: [f64; 4], step: f64, damping: f64| {
+            four(&|k| ground::driven_speed(v[k], drop[k], step, damping))
+        }
+    );
+    other!(
+        list,
+        "ground::flow::outflow_share",
+        "ground::outflow_share",
+        move |water: [f64; 4], out: [f64; 4]| {
+            four(&|k| ground::outflow_share(water[k], out[k]))
+        }
+    );
+    other!(
+        list,
+        "ground::flow::mixed_speed",
+        "ground::mixed_speed",
+        move |v: [f64; 4], kept: [f64; 4], w: [f64; 4], more: [f64; 4]| {
+            four(&|k| ground::mixed_speed(v[k], kept[k], w[k], more[k]))
+        }
+    );
+    other!(
+        list,
+        "ground::shallow::sill_depth",
+        "ground::sill_depth",
+        move |depth: [f64; 4], rise: [f64; 4]| { four(&|k| ground::sill_depth(depth[k], rise[k])) }
+    );
+    other!(
+        list,
+        "ground::shallow::discharge",
+        "ground::discharge",
+        move |v: [f64; 4], near: [f64; 4], far: [f64; 4]| {
+            four(&|k| ground::discharge(v[k], near[k], far[k]))
+        }
+    );
+    other!(
+        list,
+        "ground::shallow::rubbed_speed",
+        "ground::rubbed_speed",
+        move |v: [f64; 4], depth: [f64; 4], friction: f64, gravity: f64, step: f64| {
+            four(&|k| ground::rubbed_speed(v[k], depth[k], friction, gravity, step))
+        }
+    );
+    other!(
+        list,
+        "ground::erosion::capacity",
+        "ground::capacity",
+        move |v: [f64; 4], depth: [f64; 4], strength: f64, deepest: f64| {
+            four(&|k| ground::capacity(v[k], depth[k], strength, deepest))
+        }
+    );
+    other!(
+        list,
+        "ground::erosion::dissolved",
+        "ground::dissolved",
+        move |load: [f64; 4],
+              most: [f64; 4],
+              soft: [f64; 4],
+              depth: [f64; 4],
+              dig: f64,
+              lay: f64| {
+            four(&|k| ground::dissolved(load[k], most[k], soft[k], depth[k], dig, lay))
+        }
+    );
+    other!(
+        list,
+        "ground::erosion::slid",
+        "ground::slid",
+        move |a: [f64; 4], b: [f64; 4], steepest: f64, rate: f64| {
+            four(&|k| ground::slid(a[k], b[k], steepest, rate))
         }
     );
     other!(

@@ -1,0 +1,396 @@
+//! A ground as a file has it: how it begins and what it obeys. Those that come with the crate.
+
+use serde::{Deserialize, Serialize};
+
+use super::options::{Erosion, GroundOptions};
+use super::state::{CHANNELS, GroundState};
+use crate::device::Gpu;
+use crate::error::Error;
+use crate::program::ProgramSet;
+use crate::terrain::{HeightField, heights};
+use crate::view::WorldPos;
+
+/// What is added to the heights of the field, over the middle of the ground.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Shape {
+    /// Nothing.
+    #[default]
+    Even,
+    /// A hill in the middle, `relief` high.
+    Hill,
+    /// A hollow in the middle, `relief` deep.
+    Lake,
+    /// A valley along z, `relief` deep.
+    Valley,
+    /// A ridge along z, `relief` high.
+    Ridge,
+    /// A slope that falls by `relief` from the first to the last column.
+    Slope,
+}
+
+impl Shape {
+    /// Share of the relief at a place of the unit square.
+    pub fn share(self, x: f64, z: f64) -> f64 {
+        let bump = |r: f64| {
+            let t = (1.0 - r.abs()).clamp(0.0, 1.0);
+            t * t * (3.0 - 2.0 * t)
+        };
+        let (a, b) = (2.0 * x - 1.0, 2.0 * z - 1.0);
+        match self {
+            Shape::Even => 0.0,
+            Shape::Hill => bump((a * a + b * b).sqrt()),
+            Shape::Lake => -bump((a * a + b * b).sqrt()),
+            Shape::Valley => -bump(a),
+            Shape::Ridge => bump(a),
+            Shape::Slope => -x,
+        }
+    }
+}
+
+/// How a ground begins, and what it obeys.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GroundScene {
+    /// Cells along x, in [16, 4096].
+    pub columns: u32,
+    /// Cells along z, in [16, 4096].
+    pub rows: u32,
+    /// Heights; `None`: a plane.
+    pub field: Option<HeightField>,
+    /// Where the first cell lies on the field (m).
+    pub origin: [f64; 2],
+    /// Added to the field.
+    pub shape: Shape,
+    /// Height of the shape (m), in [-1e4, 1e4].
+    pub relief: f64,
+    /// Added everywhere (m), in [-1e4, 1e4].
+    pub altitude: f64,
+    /// Passes of smoothing, in [0, 1000].
+    pub smooth: u32,
+    /// Water stands up to this altitude (m) in the first columns.
+    pub water_level: Option<f64>,
+    /// Share of the columns that it stands in, in [0, 1].
+    pub water_share: f64,
+    /// Depth of water everywhere (m), in [0, 1e4].
+    pub depth: f64,
+    /// What it obeys.
+    pub options: GroundOptions,
+}
+
+impl Default for GroundScene {
+    fn default() -> Self {
+        GroundScene {
+            columns: 256,
+            rows: 256,
+            field: None,
+            origin: [0.0; 2],
+            shape: Shape::Even,
+            relief: 0.0,
+            altitude: 0.0,
+            smooth: 0,
+            water_level: None,
+            water_share: 1.0,
+            depth: 0.0,
+            options: GroundOptions::default(),
+        }
+    }
+}
+
+const SHIPPED: &[(&str, &str)] = &[
+    ("rain", include_str!("../../presets/grounds/rain.ron")),
+    (
+        "dam_break",
+        include_str!("../../presets/grounds/dam_break.ron"),
+    ),
+    ("flood", include_str!("../../presets/grounds/flood.ron")),
+    ("erosion", include_str!("../../presets/grounds/erosion.ron")),
+];
+
+fn parse<T: std::str::FromStr>(key: &str, value: &str, what: &str) -> Result<T, Error> {
+    value.trim().parse().map_err(|_| Error::WrongType {
+        name: key.to_owned(),
+        value: value.to_owned(),
+        expected: what.to_owned(),
+    })
+}
+
+fn word<T: serde::de::DeserializeOwned>(key: &str, value: &str, what: &str) -> Result<T, Error> {
+    let mut letters = value.trim().chars();
+    let name: String = letters
+        .next()
+        .map(|c| c.to_uppercase().collect::<String>() + &letters.as_str().to_lowercase())
+        .unwrap_or_default();
+    ron::from_str(&name).map_err(|_| Error::WrongType {
+        name: key.to_owned(),
+        value: value.to_owned(),
+        expected: what.to_owned(),
+    })
+}
+
+/// The keys that [`GroundScene::set`] knows.
+const KEYS: &[&str] = &[
+    "COLUMNS",
+    "ROWS",
+    "SIZE",
+    "SHAPE",
+    "RELIEF",
+    "ALTITUDE",
+    "SMOOTH",
+    "SEED",
+    "WATER_LEVEL",
+    "WATER_SHARE",
+    "DEPTH",
+    "SCHEME",
+    "BOUNDARY",
+    "SPACING",
+    "STEP",
+    "DAMPING",
+    "MOMENTUM",
+    "RAIN",
+    "EVAPORATION",
+    "SEEPAGE",
+    "MEAN_WEIGHT",
+    "GRAVITY",
+    "COURANT",
+    "FRICTION",
+    "LONGEST_STEP",
+    "EROSION",
+    "CAPACITY",
+    "DEEPEST",
+    "DIG",
+    "LAY",
+    "SLOPE_LIMIT",
+    "SLIDE",
+    "HARDNESS",
+    "HARD_WAVELENGTH",
+    "LAYER",
+    "SPRING",
+];
+
+impl GroundScene {
+    /// The names that [`GroundScene::named`] knows.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        SHIPPED.iter().map(|(name, _)| *name)
+    }
+
+    /// The keys that [`GroundScene::set`] knows.
+    pub fn keys() -> &'static [&'static str] {
+        KEYS
+    }
+
+    /// A ground that comes with the crate.
+    ///
+    /// # Errors
+    /// [`Error::UnknownScene`].
+    pub fn named(name: &str) -> Result<GroundScene, Error> {
+        match SHIPPED.iter().find(|(known, _)| *known == name) {
+            Some((_, text)) => GroundScene::from_ron(text),
+            None => Err(Error::UnknownScene {
+                name: name.to_owned(),
+                known: GroundScene::names().map(str::to_owned).collect(),
+            }),
+        }
+    }
+
+    /// Reads a ground as the files of `presets/grounds` have it.
+    ///
+    /// # Errors
+    /// [`Error::Ron`] with line and column; as [`GroundScene::check`].
+    pub fn from_ron(text: &str) -> Result<GroundScene, Error> {
+        let ron = ron::Options::default()
+            .with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+        let scene: GroundScene = ron
+            .from_str(text)
+            .map_err(|fault| Error::Ron(format!("no ground: {fault}")))?;
+        scene.check()?;
+        Ok(scene)
+    }
+
+    /// Sets a key, which is a field's name in upper case; RAIN, EVAPORATION and SEEPAGE in mm/h; SPRING adds one by `x,z,radius,rate`; EROSION is `on` or `off`.
+    ///
+    /// # Errors
+    /// [`Error::UnknownKey`], [`Error::WrongType`].
+    pub fn set(&mut self, key: &str, value: &str) -> Result<(), Error> {
+        let real = || parse::<f64>(key, value, "a number");
+        let single = || parse::<f32>(key, value, "a number");
+        let whole = || parse::<u32>(key, value, "a whole number");
+        let yes = || match value.trim() {
+            "on" | "true" | "1" | "yes" => Ok(true),
+            "off" | "false" | "0" | "no" => Ok(false),
+            _ => Err(Error::WrongType {
+                name: key.to_owned(),
+                value: value.to_owned(),
+                expected: "on or off".to_owned(),
+            }),
+        };
+        let o = &mut self.options;
+        const HOURLY: f64 = 1.0 / 3.6e6;
+        match key.to_uppercase().as_str() {
+            "COLUMNS" => self.columns = whole()?,
+            "ROWS" => self.rows = whole()?,
+            "SIZE" => [self.columns, self.rows] = [whole()?; 2],
+            "SHAPE" => self.shape = word(key, value, "Even, Hill, Lake, Valley, Ridge or Slope")?,
+            "RELIEF" => self.relief = real()?,
+            "ALTITUDE" => self.altitude = real()?,
+            "SMOOTH" => self.smooth = whole()?,
+            "SEED" => {
+                let seed = whole()?;
+                if let Some(field) = &mut self.field {
+                    field.seed = seed;
+                }
+            }
+            "WATER_LEVEL" => {
+                self.water_level = if value.trim() == "none" {
+                    None
+                } else {
+                    Some(real()?)
+                };
+            }
+            "WATER_SHARE" => self.water_share = real()?,
+            "DEPTH" => self.depth = real()?,
+            "SCHEME" => o.scheme = word(key, value, "Source or Physical")?,
+            "BOUNDARY" => o.boundary = word(key, value, "Open, Closed or Periodic")?,
+            "SPACING" => o.spacing = single()?,
+            "STEP" => o.step = single()?,
+            "DAMPING" => o.damping = single()?,
+            "MOMENTUM" => o.momentum = yes()?,
+            "RAIN" => o.rain = (real()? * HOURLY) as f32,
+            "EVAPORATION" => o.evaporation = (real()? * HOURLY) as f32,
+            "SEEPAGE" => o.seepage = (real()? * HOURLY) as f32,
+            "MEAN_WEIGHT" => o.mean_weight = single()?,
+            "GRAVITY" => o.gravity = single()?,
+            "COURANT" => o.courant = single()?,
+            "FRICTION" => o.friction = single()?,
+            "LONGEST_STEP" => o.longest_step = single()?,
+            "EROSION" => o.erosion = yes()?.then(|| o.erosion.unwrap_or_default()),
+            "SPRING" => {
+                let numbers = value
+                    .split(',')
+                    .map(|part| parse::<f32>(key, part, "x,z,radius,rate"))
+                    .collect::<Result<Vec<f32>, Error>>()?;
+                let &[x, z, radius, rate] = numbers.as_slice() else {
+                    return Err(Error::WrongType {
+                        name: key.to_owned(),
+                        value: value.to_owned(),
+                        expected: "x,z,radius,rate".to_owned(),
+                    });
+                };
+                o.springs.push(super::Spring { x, z, radius, rate });
+            }
+            name => {
+                let coefficient: fn(&mut Erosion) -> &mut f32 = match name {
+                    "CAPACITY" => |e| &mut e.capacity,
+                    "DEEPEST" => |e| &mut e.deepest,
+                    "DIG" => |e| &mut e.dig,
+                    "LAY" => |e| &mut e.lay,
+                    "SLOPE_LIMIT" => |e| &mut e.slope_limit,
+                    "SLIDE" => |e| &mut e.slide,
+                    "HARDNESS" => |e| &mut e.hardness,
+                    "HARD_WAVELENGTH" => |e| &mut e.hard_wavelength,
+                    "LAYER" => |e| &mut e.layer,
+                    _ => {
+                        return Err(Error::UnknownKey {
+                            name: key.to_owned(),
+                            nearest: crate::error::nearest_name(name, KEYS.iter().copied()),
+                        });
+                    }
+                };
+                *coefficient(o.erosion.get_or_insert_default()) = single()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] that names the field, its value and what is allowed.
+    pub fn check(&self) -> Result<(), Error> {
+        let within = |name: &str, value: f64, low: f64, high: f64| {
+            if (low..=high).contains(&value) {
+                return Ok(());
+            }
+            Err(Error::OutOfDomain {
+                name: format!("ground.{name}"),
+                value: value.to_string(),
+                domain: format!("in [{low}, {high}]"),
+            })
+        };
+        within("columns", self.columns.into(), 16.0, 4096.0)?;
+        within("rows", self.rows.into(), 16.0, 4096.0)?;
+        within("relief", self.relief, -1e4, 1e4)?;
+        within("altitude", self.altitude, -1e4, 1e4)?;
+        within("smooth", self.smooth.into(), 0.0, 1000.0)?;
+        within("water_level", self.water_level.unwrap_or(0.0), -1e4, 2e4)?;
+        within("water_share", self.water_share, 0.0, 1.0)?;
+        within("depth", self.depth, 0.0, 1e4)?;
+        for origin in self.origin {
+            within("origin", origin, -1e12, 1e12)?;
+        }
+        if let Some(field) = &self.field {
+            field.check()?;
+        }
+        self.options.check()
+    }
+
+    /// How it begins. Heights of the field are found on the device: submits and waits.
+    ///
+    /// # Errors
+    /// As [`GroundScene::check`], [`heights`] and [`GroundState::from_channels`].
+    pub fn begin(&self, gpu: &Gpu, programs: &ProgramSet) -> Result<GroundState, Error> {
+        self.check()?;
+        let (columns, rows) = (self.columns as usize, self.rows as usize);
+        let spacing = f64::from(self.options.spacing);
+        let mut ground = vec![0.0_f64; columns * rows];
+        if let Some(field) = &self.field {
+            let places: Vec<WorldPos> = (0..rows * columns)
+                .map(|k| {
+                    let x = self.origin[0] + (k % columns) as f64 * spacing;
+                    let z = self.origin[1] + (k / columns) as f64 * spacing;
+                    WorldPos::from_metres(glam::DVec3::new(x, 0.0, z))
+                })
+                .collect();
+            let found = heights(gpu, programs, field, &places, spacing as f32)?;
+            for (to, from) in ground.iter_mut().zip(&found) {
+                *to = f64::from(from.height);
+            }
+        }
+        for (k, height) in ground.iter_mut().enumerate() {
+            let x = ((k % columns) as f64 + 0.5) / columns as f64;
+            let z = ((k / columns) as f64 + 0.5) / rows as f64;
+            *height += self.altitude + self.relief * self.shape.share(x, z);
+        }
+        for _ in 0..self.smooth {
+            ground = smoothed(&ground, columns, rows);
+        }
+        let heights: Vec<f32> = ground.iter().map(|h| *h as f32).collect();
+        let mut state = GroundState::from_heights(columns, rows, &heights)?;
+        let wet = (self.water_share * columns as f64).round() as usize;
+        for (k, cell) in state.cells.chunks_exact_mut(CHANNELS).enumerate() {
+            let mut water = self.depth;
+            if let Some(level) = self.water_level
+                && k % columns < wet
+            {
+                water = water.max(level - f64::from(cell[0]));
+            }
+            cell[1] = water as f32;
+            cell[3] = water as f32;
+        }
+        Ok(state)
+    }
+}
+
+/// Every cell the mean of itself and its neighbours, weighted by 4, 2 and 1.
+fn smoothed(ground: &[f64], columns: usize, rows: usize) -> Vec<f64> {
+    let at = |x: usize, z: usize| ground[z * columns + x];
+    (0..rows * columns)
+        .map(|k| {
+            let (x, z) = (k % columns, k / columns);
+            let (l, r) = (x.saturating_sub(1), (x + 1).min(columns - 1));
+            let (d, u) = (z.saturating_sub(1), (z + 1).min(rows - 1));
+            let sides = (at(l, z) + at(r, z)) + (at(x, d) + at(x, u));
+            let corners = (at(l, d) + at(r, u)) + (at(l, u) + at(r, d));
+            (4.0 * at(x, z) + 2.0 * sides + corners) / 16.0
+        })
+        .collect()
+}
