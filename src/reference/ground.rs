@@ -55,7 +55,7 @@ pub fn capacity(speed: f64, depth: f64, strength: f64, deepest: f64) -> f64 {
 
 /// What goes from the ground into the water.
 pub fn dissolved(load: f64, most: f64, softness: f64, depth: f64, dig: f64, lay: f64) -> f64 {
-    if depth < 1e-5 {
+    if depth < f64::from(1e-5_f32) {
         return -load;
     }
     let gap = most - load;

@@ -11,6 +11,7 @@
 /// domain  deepest in [0, 100] m lin
 /// range   [0, 1e5] m
 /// error   0.1 abs of reference::ground::capacity
+/// outside undefined
 /// source  weather digest 9
 fn capacity(speed: vec4<f32>, depth: vec4<f32>, strength: f32, deepest: f32) -> vec4<f32> {
     return strength * speed * min(depth, vec4<f32>(deepest));
@@ -26,6 +27,7 @@ fn capacity(speed: vec4<f32>, depth: vec4<f32>, strength: f32, deepest: f32) -> 
 /// domain  lay in [0, 1] 1 lin
 /// range   [-1e3, 1e3] m
 /// error   1e-3 abs of reference::ground::dissolved
+/// outside undefined
 /// source  weather digest 9
 fn dissolved(load: vec4<f32>, most: vec4<f32>, softness: vec4<f32>, depth: vec4<f32>, dig: f32, lay: f32) -> vec4<f32> {
     let gap = most - load;
@@ -41,6 +43,7 @@ fn dissolved(load: vec4<f32>, most: vec4<f32>, softness: vec4<f32>, depth: vec4<
 /// domain  rate in [0, 0.2] 1 lin
 /// range   [-4e3, 4e3] m
 /// error   2e-3 abs of reference::ground::slid
+/// outside undefined
 /// source  ours: the same number with opposite signs on both sides of an edge
 fn slid(ground: vec4<f32>, beside: vec4<f32>, steepest: f32, rate: f32) -> vec4<f32> {
     let above = beside - ground;

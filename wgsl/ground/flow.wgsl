@@ -24,6 +24,7 @@ fn level_drop(level: vec4<f32>, beside: vec4<f32>, water: vec4<f32>) -> vec4<f32
 /// domain  damping in [0, 1] 1 lin
 /// range   [0, 1.2e4] m
 /// error   2e-3 abs of reference::ground::driven_speed
+/// outside undefined
 /// source  weather digest 4.2; departs: below 1e-8 it is nothing
 fn driven_speed(speed: vec4<f32>, drop: vec4<f32>, step: f32, damping: f32) -> vec4<f32> {
     let faster = (speed + drop * step) * damping;
@@ -32,10 +33,11 @@ fn driven_speed(speed: vec4<f32>, drop: vec4<f32>, step: f32, damping: f32) -> v
 
 /// Factor on a cell's outflow speeds, so that no more leaves than there is.
 ///
-/// domain  water in [0, 1e4] m lin
-/// domain  outflow in [0, 1e5] m lin
+/// domain  water in [1e-6, 1e4] m log
+/// domain  outflow in [1e-6, 1e5] m log
 /// range   [0, 1] 1
 /// error   1e-6 abs of reference::ground::outflow_share
+/// outside undefined
 /// source  weather digest 4.2; departs: a millionth stays, for the rounding of sums
 fn outflow_share(water: vec4<f32>, outflow: vec4<f32>) -> vec4<f32> {
     let most = water * 0.999999;
@@ -45,11 +47,12 @@ fn outflow_share(water: vec4<f32>, outflow: vec4<f32>) -> vec4<f32> {
 /// The speed of water that stays, mixed with that of what arrives in the same direction.
 ///
 /// domain  speed in [0, 1e3] m lin
-/// domain  kept in [0, 1e4] m lin
+/// domain  kept in [1e-6, 1e4] m log
 /// domain  arriving_speed in [0, 1e3] m lin
 /// domain  arriving in [0, 1e4] m lin
 /// range   [0, 1.001e3] m
 /// error   2e-3 abs of reference::ground::mixed_speed
+/// outside undefined
 /// source  weather digest 4.3 (suggestion)
 fn mixed_speed(speed: vec4<f32>, kept: vec4<f32>, arriving_speed: vec4<f32>, arriving: vec4<f32>) -> vec4<f32> {
     // One product in one sum: compilers that fuse them do it alike for all directions.

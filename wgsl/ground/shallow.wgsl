@@ -22,6 +22,7 @@ fn sill_depth(depth: vec4<f32>, rise: vec4<f32>) -> vec4<f32> {
 /// domain  far in [0, 1e3] m lin
 /// range   [-1e5, 1e5] m^2/s
 /// error   2e-2 abs of reference::ground::discharge
+/// outside undefined
 /// source  Stelling2003 (first-order upwind)
 fn discharge(speed: vec4<f32>, near: vec4<f32>, far: vec4<f32>) -> vec4<f32> {
     return max(speed, vec4<f32>(0.0)) * near + min(speed, vec4<f32>(0.0)) * far;
@@ -36,6 +37,7 @@ fn discharge(speed: vec4<f32>, near: vec4<f32>, far: vec4<f32>) -> vec4<f32> {
 /// domain  step in [0, 10] s lin
 /// range   [-100, 100] m/s
 /// error   1e-3 abs of reference::ground::rubbed_speed
+/// outside undefined
 /// source  Manning's law
 fn rubbed_speed(speed: vec4<f32>, depth: vec4<f32>, friction: f32, gravity: f32, step: f32) -> vec4<f32> {
     let deep = max(depth, vec4<f32>(1e-4));
