@@ -8,6 +8,7 @@
 /// domain  x in [0, 1] 1 lin
 /// range   [-0.125, 1] 1
 /// error   3e-7 abs of reference::post::catmull_rom
+/// outside undefined
 /// source  Keys1981, section II
 fn catmull_rom(x: f32) -> vec4<f32> {
     let y = 1.0 - x;
@@ -32,6 +33,7 @@ fn pixel_share(x: f32) -> f32 {
 /// domain  bound in [0.1, 100] 1 log
 /// range   [0, 1] 1
 /// error   1e-6 rel of reference::post::box_share
+/// outside undefined
 /// source  Salvi2016; along the line to the mean as Karis2014 does
 fn box_share(difference: vec3<f32>, deviation: vec3<f32>, bound: f32) -> f32 {
     let most = abs(difference) / (bound * deviation + 1e-6);
