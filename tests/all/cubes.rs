@@ -333,7 +333,7 @@ fn layer_rays(to_sun: [f64; 3]) -> Vec<ProbeRay> {
     rays
 }
 
-/// Judges `march_tile`.
+/// Judges `march_tile`, and `tile_at` by what it makes of it.
 #[test]
 fn a_layer_from_its_tile_meets_the_march() {
     for deck in ["thesis", "stratus"] {
