@@ -41,7 +41,7 @@ fn rays(
     (rays, (2.0 * up.length() / rows as f64) as f32)
 }
 
-/// Judges `clip_hit`.
+/// Judges `clip_hit`, and `refined_hit` after it.
 #[test]
 fn rays_over_baked_heights_meet_the_field() {
     // Craters cost the reference ten times as much as noise.
