@@ -3,7 +3,7 @@
 use super::directions::{directions, harmonics};
 use super::phase::Lobes;
 use super::tile::{Tile, slant};
-use super::volume::{Kernel, WAY, filled, room};
+use super::volume::{Kernel, WAY, dispatch, filled, groups, room, uniform_of};
 use super::{CloudDeck, CubeLight};
 use crate::atmosphere::ProbeRay;
 use crate::device::Gpu;
@@ -88,51 +88,6 @@ impl<'a> LayerOrders<'a> {
         })
     }
 
-    fn groups(
-        &self,
-        kernel: &Kernel,
-        bound: &[Vec<(u32, wgpu::BindingResource<'_>)>; 3],
-    ) -> Vec<wgpu::BindGroup> {
-        let made = |(layout, list): (_, &Vec<(u32, wgpu::BindingResource<'_>)>)| {
-            let entries: Vec<wgpu::BindGroupEntry<'_>> = list
-                .iter()
-                .map(|(binding, resource)| wgpu::BindGroupEntry {
-                    binding: *binding,
-                    resource: resource.clone(),
-                })
-                .collect();
-            self.gpu
-                .device
-                .create_bind_group(&wgpu::BindGroupDescriptor {
-                    label: Some("veduta layer orders"),
-                    layout,
-                    entries: &entries,
-                })
-        };
-        kernel.1.iter().zip(bound).map(made).collect()
-    }
-
-    fn dispatch(
-        encoder: &mut wgpu::CommandEncoder,
-        kernel: &Kernel,
-        groups: &[wgpu::BindGroup],
-        count: usize,
-    ) {
-        let mut pass = encoder.begin_compute_pass(&Default::default());
-        pass.set_pipeline(&kernel.0);
-        for (index, group) in (0..).zip(groups) {
-            pass.set_bind_group(index, group, &[]);
-        }
-        pass.dispatch_workgroups(count as u32, 1, 1);
-    }
-
-    fn uniform(&self, block: &GridBlock) -> wgpu::Buffer {
-        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let buffer = room(&self.gpu.device, GridBlock::SIZE, usage);
-        self.gpu.queue.write_buffer(&buffer, 0, &block.to_bytes());
-        buffer
-    }
-
     fn block(&self, to_sun: [f64; 3], lighting: &Lighting) -> GridBlock {
         let to_sun = to_sun.map(|c| c as f32);
         GridBlock {
@@ -153,11 +108,12 @@ impl<'a> LayerOrders<'a> {
         for (edge, levels, sweeps) in GRIDS {
             let count = edge * edge * levels;
             let shape = [edge, levels, edge].map(|n| n as i32);
-            let uniform = self.uniform(&GridBlock {
+            let block = GridBlock {
                 cells: shape,
                 coarse: coarser.as_ref().map_or([1; 3], |c| c.1),
                 ..self.block(to_sun, lighting)
-            });
+            };
+            let uniform = uniform_of(self.gpu, &block);
             let storage = |size| room(device, size, usage);
             let cells = storage(8 * count);
             let source = storage(4 * 24 * count);
@@ -170,32 +126,41 @@ impl<'a> LayerOrders<'a> {
                 (1, wgpu::BindingResource::TextureView(&tile.views[0])),
             ];
             let mut encoder = device.create_command_encoder(&Default::default());
-            let fill = self.groups(&self.fill, &[head.clone(), seen, held(&[(1, &cells)])]);
-            Self::dispatch(&mut encoder, &self.fill, &fill, count.div_ceil(64));
+            let fill = groups(
+                self.gpu,
+                &self.fill,
+                &[head.clone(), seen, held(&[(1, &cells)])],
+            );
+            dispatch(&mut encoder, &self.fill, &fill, count.div_ceil(64));
             let gathered = |kernel: &Kernel, place: u32, from: &wgpu::Buffer| {
                 let read = held(&[(2, &ways), (3, &cells), (place, from)]);
-                self.groups(
+                groups(
+                    self.gpu,
                     kernel,
                     &[head.clone(), read, held(&[(3, &source), (4, &moments)])],
                 )
             };
             let gather = gathered(&self.gather, 5, &radiance);
             let read = held(&[(2, &ways), (3, &cells), (4, &source)]);
-            let sweep = self.groups(&self.sweep, &[head.clone(), read, held(&[(2, &radiance)])]);
+            let sweep = groups(
+                self.gpu,
+                &self.sweep,
+                &[head.clone(), read, held(&[(2, &radiance)])],
+            );
             match &coarser {
                 Some((coarse, _)) => {
                     let prolong = gathered(&self.prolong, 6, coarse);
-                    Self::dispatch(&mut encoder, &self.prolong, &prolong, count.div_ceil(64));
+                    dispatch(&mut encoder, &self.prolong, &prolong, count.div_ceil(64));
                 }
                 None => {
                     let mean = 0.5 * (lighting.around[0] + lighting.around[1]);
                     queue.write_buffer(&radiance, 0, &mean.to_le_bytes().repeat(24 * count));
-                    Self::dispatch(&mut encoder, &self.gather, &gather, count.div_ceil(64));
+                    dispatch(&mut encoder, &self.gather, &gather, count.div_ceil(64));
                 }
             }
             for _ in 0..sweeps {
-                Self::dispatch(&mut encoder, &self.sweep, &sweep, 24);
-                Self::dispatch(&mut encoder, &self.gather, &gather, count.div_ceil(64));
+                dispatch(&mut encoder, &self.sweep, &sweep, 24);
+                dispatch(&mut encoder, &self.gather, &gather, count.div_ceil(64));
             }
             queue.submit([encoder.finish()]);
             coarser = Some((moments, shape));
@@ -237,11 +202,12 @@ impl<'a> LayerOrders<'a> {
     ) -> Result<Vec<CubeLight>, Error> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let [n, levels] = [GRIDS[2].0, GRIDS[2].1].map(|n| n as i32);
-        let uniform = self.uniform(&GridBlock {
+        let block = GridBlock {
             count: rays.len() as i32,
             cells: [n, levels, n],
             ..self.block(to_sun, lighting)
-        });
+        };
+        let uniform = uniform_of(self.gpu, &block);
         let mut rows = Vec::with_capacity(32 * rays.len());
         for ray in rays {
             let [x, y, z] = ray.dir;
@@ -260,7 +226,7 @@ impl<'a> LayerOrders<'a> {
         ];
         let head = vec![(0, uniform.as_entire_binding())];
         let written = vec![(5, exchange.output.as_entire_binding())];
-        let groups = self.groups(&self.rays, &[head, read, written]);
+        let groups = groups(self.gpu, &self.rays, &[head, read, written]);
         let encoder = device.create_command_encoder(&Default::default());
         let workgroups = rays.len().div_ceil(64) as u32;
         let found = exchange.run(device, queue, encoder, &self.rays.0, &groups, workgroups)?;

@@ -327,50 +327,13 @@ impl<'a> Solver<'a> {
         })
     }
 
-    fn uniform(&self, block: &GridBlock) -> wgpu::Buffer {
-        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
-        let buffer = room(&self.gpu.device, GridBlock::SIZE, usage);
-        self.gpu.queue.write_buffer(&buffer, 0, &block.to_bytes());
-        buffer
-    }
-
     fn groups(&self, kernel: &Kernel, bound: [&[(u32, &wgpu::Buffer)]; 3]) -> Vec<wgpu::BindGroup> {
-        kernel
-            .1
-            .iter()
-            .zip(bound)
-            .map(|(layout, buffers)| {
-                let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
-                    .iter()
-                    .map(|(binding, buffer)| wgpu::BindGroupEntry {
-                        binding: *binding,
-                        resource: buffer.as_entire_binding(),
-                    })
-                    .collect();
-                self.gpu
-                    .device
-                    .create_bind_group(&wgpu::BindGroupDescriptor {
-                        label: Some("veduta cube"),
-                        layout,
-                        entries: &entries,
-                    })
-            })
-            .collect()
-    }
-
-    fn dispatch(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        kernel: &Kernel,
-        groups: &[wgpu::BindGroup],
-        count: usize,
-    ) {
-        let mut pass = encoder.begin_compute_pass(&Default::default());
-        pass.set_pipeline(&kernel.0);
-        for (index, group) in (0..).zip(groups) {
-            pass.set_bind_group(index, group, &[]);
+        fn whole<'a>(list: &[(u32, &'a wgpu::Buffer)]) -> Vec<(u32, wgpu::BindingResource<'a>)> {
+            list.iter()
+                .map(|(binding, buffer)| (*binding, buffer.as_entire_binding()))
+                .collect()
         }
-        pass.dispatch_workgroups(count as u32, 1, 1);
+        groups(self.gpu, kernel, &bound.map(whole))
     }
 
     fn prepare(&self, to_sun: [f64; 3]) -> Result<Prepared, Error> {
@@ -399,10 +362,10 @@ impl<'a> Solver<'a> {
         let n = self.block.nodes as usize;
         let depths = storage(4 * n * n * n);
         let mut encoder = device.create_command_encoder(&Default::default());
-        let uniform = self.uniform(&block);
+        let uniform = uniform_of(self.gpu, &block);
         let bound: [&[_]; 3] = [&[(0, &uniform)], &[(0, &self.density)], &[(0, &depths)]];
         let groups = self.groups(&self.nodes, bound);
-        self.dispatch(&mut encoder, &self.nodes, &groups, (n * n * n).div_ceil(64));
+        dispatch(&mut encoder, &self.nodes, &groups, (n * n * n).div_ceil(64));
         queue.submit([encoder.finish()]);
         if !all {
             return Ok(Prepared {
@@ -416,7 +379,7 @@ impl<'a> Solver<'a> {
             let count = edge * edge * edge;
             block.cells = [edge as i32; 3];
             block.coarse = [coarser.as_ref().map_or(1, |c| c.1 as i32); 3];
-            let uniform = self.uniform(&block);
+            let uniform = uniform_of(self.gpu, &block);
             let cells = storage(8 * count);
             let source = storage(4 * 24 * count);
             let moments = storage(64 * count);
@@ -429,7 +392,7 @@ impl<'a> Solver<'a> {
                 &[(1, &cells)],
             ];
             let groups = self.groups(&self.fill, bound);
-            self.dispatch(&mut encoder, &self.fill, &groups, count.div_ceil(64));
+            dispatch(&mut encoder, &self.fill, &groups, count.div_ceil(64));
             let gathered = |kernel: &Kernel, place: u32, from: &wgpu::Buffer| {
                 let bound: [&[_]; 3] = [
                     &[(0, &uniform)],
@@ -448,17 +411,17 @@ impl<'a> Solver<'a> {
             match &coarser {
                 Some((coarse, _)) => {
                     let prolong = gathered(&self.prolong, 6, coarse);
-                    self.dispatch(&mut encoder, &self.prolong, &prolong, count.div_ceil(64));
+                    dispatch(&mut encoder, &self.prolong, &prolong, count.div_ceil(64));
                 }
                 None => {
                     let start = self.options.uniform.to_le_bytes().repeat(24 * count);
                     queue.write_buffer(&radiance, 0, &start);
-                    self.dispatch(&mut encoder, &self.gather, &gather, count.div_ceil(64));
+                    dispatch(&mut encoder, &self.gather, &gather, count.div_ceil(64));
                 }
             }
             for _ in 0..sweeps {
-                self.dispatch(&mut encoder, &self.sweep, &sweep, 24);
-                self.dispatch(&mut encoder, &self.gather, &gather, count.div_ceil(64));
+                dispatch(&mut encoder, &self.sweep, &sweep, 24);
+                dispatch(&mut encoder, &self.gather, &gather, count.div_ceil(64));
             }
             queue.submit([encoder.finish()]);
             coarser = Some((moments, edge));
@@ -504,7 +467,7 @@ impl<'a> Solver<'a> {
             count: rays.len() as i32,
             ..prepared.block
         };
-        let uniform = self.uniform(&block);
+        let uniform = uniform_of(self.gpu, &block);
         let mut rows = Vec::with_capacity(32 * rays.len());
         for ray in rays {
             for v in [ray.entered(), ray.dir] {
@@ -549,6 +512,50 @@ pub(super) fn room(device: &wgpu::Device, size: usize, usage: wgpu::BufferUsages
         usage,
         mapped_at_creation: false,
     })
+}
+
+pub(super) fn uniform_of(gpu: &Gpu, block: &GridBlock) -> wgpu::Buffer {
+    let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+    let buffer = room(&gpu.device, GridBlock::SIZE, usage);
+    gpu.queue.write_buffer(&buffer, 0, &block.to_bytes());
+    buffer
+}
+
+/// The groups of a kernel, from what is bound in each by number.
+pub(super) fn groups(
+    gpu: &Gpu,
+    kernel: &Kernel,
+    bound: &[Vec<(u32, wgpu::BindingResource<'_>)>; 3],
+) -> Vec<wgpu::BindGroup> {
+    let made = |(layout, list): (_, &Vec<(u32, wgpu::BindingResource<'_>)>)| {
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = list
+            .iter()
+            .map(|(binding, resource)| wgpu::BindGroupEntry {
+                binding: *binding,
+                resource: resource.clone(),
+            })
+            .collect();
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("veduta cloud light"),
+            layout,
+            entries: &entries,
+        })
+    };
+    kernel.1.iter().zip(bound).map(made).collect()
+}
+
+pub(super) fn dispatch(
+    encoder: &mut wgpu::CommandEncoder,
+    kernel: &Kernel,
+    groups: &[wgpu::BindGroup],
+    count: usize,
+) {
+    let mut pass = encoder.begin_compute_pass(&Default::default());
+    pass.set_pipeline(&kernel.0);
+    for (index, group) in (0..).zip(groups) {
+        pass.set_bind_group(index, group, &[]);
+    }
+    pass.dispatch_workgroups(count as u32, 1, 1);
 }
 
 pub(super) fn filled(gpu: &Gpu, bytes: &[u8]) -> wgpu::Buffer {

@@ -73,3 +73,17 @@ pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
         })
         .collect()
 }
+
+/// Lagrange's weights of values at 0, 1, 2 and 3 for the place `x`; of the two nearest where there are `few`.
+pub fn cubic_weights(x: f64, few: bool) -> [f64; 4] {
+    std::array::from_fn(|k| {
+        let own = k as f64;
+        if few {
+            return (1.0 - (x - own).abs()).max(0.0);
+        }
+        (0..4)
+            .filter(|j| *j != k)
+            .map(|j| (x - j as f64) / (own - j as f64))
+            .product()
+    })
+}

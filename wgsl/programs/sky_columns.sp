@@ -5,17 +5,10 @@ of them has a bend that the eye sees as a stripe. `sky_refine` puts further rows
 
 #COMPUTE{
     #CODE{
+#import veduta::math::cubic::{cubic_weights}
+
 @group(1) @binding(0) var computed: texture_2d_array<f32>;
 @group(2) @binding(0) var columns: texture_storage_2d_array<rgba32float, write>;
-
-// Weights of four columns, numbers 0 to 3, for the place `x` among them: Lagrange's, or of the two nearest where there are `few`.
-fn weights_at(x: f32, few: bool) -> vec4<f32> {
-    let a = x - 1.0;
-    let b = x - 2.0;
-    let c = x - 3.0;
-    let line = max(1.0 - abs(vec4<f32>(x, a, b, c)), vec4<f32>(0.0));
-    return select(vec4<f32>(a * b * c * -0.16666667, x * b * c * 0.5, x * a * c * -0.5, x * a * b * 0.16666667), line, few);
-}
 
 @compute @workgroup_size(8, 8)
 fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -37,7 +30,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
         let c = textureLoad(computed, vec2<i32>(min(first + 2, count - 1), row), layer, 0);
         let d = textureLoad(computed, vec2<i32>(min(first + 3, count - 1), row), layer, 0);
         for (var k = 0; k < last; k++) {
-            let weights = weights_at(f32(column - first) + f32(k) / f32(each), few);
+            let weights = cubic_weights(f32(column - first) + f32(k) / f32(each), few);
             let sum = a * weights.x + b * weights.y + c * weights.z + d * weights.w;
             textureStore(columns, vec2<i32>(column * each + k, row), layer, sum);
         }

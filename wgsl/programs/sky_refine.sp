@@ -5,20 +5,12 @@ of them has a bend that the eye sees as a stripe. Rows above the horizon and bel
 
 #COMPUTE{
     #CODE{
+#import veduta::math::cubic::{cubic_weights}
 #import veduta::atmosphere::sky_view::{SkyEye, sky_coded, sky_rows}
 
 @group(0) @binding(1) var<uniform> eye: SkyEye;
 @group(1) @binding(0) var columns: texture_2d_array<f32>;
 @group(2) @binding(0) var sky: texture_storage_2d_array<rgba16float, write>;
-
-// Weights of four rows, numbers 0 to 3, for the place `x` among them: Lagrange's, or of the two nearest where there are `few`.
-fn weights_at(x: f32, few: bool) -> vec4<f32> {
-    let a = x - 1.0;
-    let b = x - 2.0;
-    let c = x - 3.0;
-    let line = max(1.0 - abs(vec4<f32>(x, a, b, c)), vec4<f32>(0.0));
-    return select(vec4<f32>(a * b * c * -0.16666667, x * b * c * 0.5, x * a * c * -0.5, x * a * b * 0.16666667), line, few);
-}
 
 @compute @workgroup_size(8, 8)
 fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -49,7 +41,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
         let c = textureLoad(columns, vec2<i32>(column, start + min(first + 2, count - 1)), layer, 0).rgb;
         let d = textureLoad(columns, vec2<i32>(column, start + min(first + 3, count - 1)), layer, 0).rgb;
         for (var k = from_row; k < to_row; k++) {
-            let weights = weights_at(f32(k) * rise - f32(first), few);
+            let weights = cubic_weights(f32(k) * rise - f32(first), few);
             let sum = a * weights.x + b * weights.y + c * weights.z + d * weights.w;
             // Light is not negative; codes may be.
             textureStore(sky, vec2<i32>(column, fine_start + k), layer, vec4<f32>(select(max(sum, vec3<f32>(0.0)), sum, coded), 1.0));

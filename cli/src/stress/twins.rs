@@ -1189,6 +1189,7 @@ pub fn registry() -> Vec<Entry> {
         warped_fbm_2d_slope,
         warped_fbm_3d_slope
     );
+    same!(list, "math::cubic", "math", math, cubic_weights);
     same!(
         list,
         "math::series",
