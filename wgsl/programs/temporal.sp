@@ -75,6 +75,14 @@ fn blend(texels: Four, weights: vec4<f32>) -> vec4<f32> {
     return vec4<f32>(dot(texels.r, weights), dot(texels.g, weights), dot(texels.b, weights), dot(texels.a, weights));
 }
 
+fn least_of(v: vec4<f32>) -> f32 {
+    return min(min(v.x, v.y), min(v.z, v.w));
+}
+
+fn most_of(v: vec4<f32>) -> f32 {
+    return max(max(v.x, v.y), max(v.z, v.w));
+}
+
 fn codes(values: vec4<f32>, chance: vec4<u32>) -> vec4<u32> {
     let bits = bitcast<vec4<u32>>(clamp(values, vec4<f32>(0.0), vec4<f32>(1.6e7))) + chance;
     return (max(bits, vec4<u32>(0x2b800000u)) - 0x2b800000u) >> vec4<u32>(13u);
@@ -118,17 +126,13 @@ fn resolve(@builtin(position) position: vec4<f32>) -> Joined {
     let d1 = (textureGather(depths, nearest, vec2<f32>(first.x + 2.0, first.y) / taken) + temporal.depth_offset) * temporal.inverse_numerator;
     let d2 = (textureGather(depths, nearest, vec2<f32>(first.x, first.y + 2.0) / taken) + temporal.depth_offset) * temporal.inverse_numerator;
     let d3 = (textureGather(depths, nearest, (first + 2.0) / taken) + temporal.depth_offset) * temporal.inverse_numerator;
-    let most = max(max(d0, d1), max(d2, d3));
-    let least = min(min(d0, d1), min(d2, d3));
-    let near = max(max(most.x, most.y), max(most.z, most.w));
-    let far = max(min(min(least.x, least.y), min(least.z, least.w)), 0.0);
+    let near = most_of(max(max(d0, d1), max(d2, d3)));
+    let far = max(least_of(min(min(d0, d1), min(d2, d3))), 0.0);
     // On a plane it is linear across the picture; across edges that of the nearest sample, or of what is in front, with which edges move. Gathers give (0, 1), (1, 1), (1, 0), (0, 0).
     let linear_one = mix(mix(inverse.w, inverse.z, off.x), mix(inverse.x, inverse.y, off.x), off.y);
     let right_one = vec2<f32>(off >= vec2<f32>(0.5));
     let middle_one = mix(mix(inverse.w, inverse.z, right_one.x), mix(inverse.x, inverse.y, right_one.x), right_one.y);
-    let front = max(max(inverse.x, inverse.y), max(inverse.z, inverse.w));
-    let back = min(min(inverse.x, inverse.y), min(inverse.z, inverse.w));
-    let own = select(select(middle_one, near, middle_one < 0.7 * near), linear_one, back > 0.7 * front);
+    let own = select(select(middle_one, near, middle_one < 0.7 * near), linear_one, least_of(inverse) > 0.7 * most_of(inverse));
     let clip = vec2<f32>(2.0 * at.x - 1.0, 1.0 - 2.0 * at.y);
     let place = vec4<f32>(temporal.ray_middle + clip.x * temporal.ray_right + clip.y * temporal.ray_up, own);
     let w = dot(temporal.before_w, place);
@@ -165,7 +169,10 @@ fn resolve(@builtin(position) position: vec4<f32>) -> Joined {
         let f3 = four(textureGather(0, history_rg, nearest, e3), textureGather(0, history_ba, nearest, e3));
         let cubic = blend(f0, vec4<f32>(x.x * y.y, x.y * y.y, x.y * y.x, x.x * y.x)) + blend(f1, vec4<f32>(x.z * y.y, x.w * y.y, x.w * y.x, x.z * y.x))
             + blend(f2, vec4<f32>(x.x * y.w, x.y * y.w, x.y * y.z, x.x * y.z)) + blend(f3, vec4<f32>(x.z * y.w, x.w * y.w, x.w * y.z, x.z * y.z));
-        old = select(old, max(cubic, vec4<f32>(0.0)), known > 0.999);
+        // A cubic overshoots beside edges: no darker or brighter than the four around.
+        let least = vec4<f32>(least_of(around.r), least_of(around.g), least_of(around.b), least_of(around.a));
+        let most = vec4<f32>(most_of(around.r), most_of(around.g), most_of(around.b), most_of(around.a));
+        old = select(old, clamp(cubic, least, most), known > 0.999);
     }
     var count = dot(counts, valid) / max(known, 1e-6);
     if TEMPORAL_BOUNDED != 0 {

@@ -118,7 +118,6 @@ impl Drawer {
             taken: [taken.width, taken.height],
             size: [size.width, size.height],
             bound: f32::INFINITY,
-            sharp: preset != "low",
             ..TemporalOptions::of([size.width, size.height])
         };
         let mut temporal = Temporal::new(&bench.gpu.device, veduta::programs(), &options)?;
