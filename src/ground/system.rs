@@ -12,6 +12,9 @@ use crate::program::ProgramSet;
 const CONTROL: usize = 16;
 const BOOK: usize = 12;
 
+/// Cells along an edge of a tile.
+const TILE: usize = 32;
+
 /// Sums of what happened since the ground was made or its state set. Depths summed over cells (m).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GroundReport {
@@ -291,9 +294,9 @@ impl Ground {
         options.check()?;
         let (columns, rows) = (state.columns, state.rows);
         let groups = columns.div_ceil(4);
-        let tiles_x = groups.div_ceil(8);
-        let tiles = tiles_x * rows.div_ceil(32);
-        let pair = (2 * groups * rows * 16) as u64;
+        let tiles_x = columns.div_ceil(TILE);
+        let tiles = tiles_x * rows.div_ceil(TILE);
+        let pair = (2 * tiles * TILE * TILE * 4) as u64;
         let limits = device.limits();
         let available = limits
             .max_storage_buffer_binding_size
@@ -547,6 +550,17 @@ impl Ground {
         Ok(())
     }
 
+    /// Floats a plane: whole tiles.
+    fn plane(&self) -> usize {
+        self.tiles * TILE * TILE
+    }
+
+    /// Where a cell is in a plane: tile after tile, rows of a tile one after the other, so that memory is read in the order in which it lies.
+    fn place_of(&self, x: usize, z: usize) -> usize {
+        let tile = (z / TILE) * self.tiles_x + x / TILE;
+        (tile * TILE + z % TILE) * TILE + x % TILE
+    }
+
     fn wake(&self, queue: &wgpu::Queue) {
         let flags: Vec<u8> = std::iter::repeat_n(1_u32.to_le_bytes(), self.tiles)
             .flatten()
@@ -644,14 +658,14 @@ impl Ground {
             high = high.max(c[0] + c[8]);
         }
         self.reference = 0.0_f32.clamp(low, high).round();
-        let stride = 4 * self.groups;
-        let plane = stride * self.rows;
+        let plane = self.plane();
         let pair = |first: &dyn Fn(usize, usize) -> f32, second: &dyn Fn(usize, usize) -> f32| {
             let mut numbers = vec![0.0_f32; 2 * plane];
             for z in 0..self.rows {
                 for x in 0..self.columns {
-                    numbers[z * stride + x] = first(x, z);
-                    numbers[plane + z * stride + x] = second(x, z);
+                    let at = self.place_of(x, z);
+                    numbers[at] = first(x, z);
+                    numbers[plane + at] = second(x, z);
                 }
             }
             numbers
@@ -997,12 +1011,11 @@ impl Ground {
                     .collect()
             })
             .collect();
-        let stride = 4 * self.groups;
-        let second = stride * self.rows;
+        let second = self.plane();
         let mut cells = vec![0.0; self.columns * self.rows * CHANNELS];
         for z in 0..self.rows {
             for x in 0..self.columns {
-                let at = z * stride + x;
+                let at = self.place_of(x, z);
                 let cell = (z * self.columns + x) * CHANNELS;
                 let c = &mut cells[cell..cell + CHANNELS];
                 c[0] = planes[4][second + at];
@@ -1016,16 +1029,16 @@ impl Ground {
                 if physical {
                     let wraps = self.options.boundary == Boundary::Periodic;
                     let left = if x > 0 {
-                        planes[1][at - 1]
+                        planes[1][self.place_of(x - 1, z)]
                     } else if wraps {
-                        planes[1][z * stride + self.columns - 1]
+                        planes[1][self.place_of(self.columns - 1, z)]
                     } else {
                         0.0
                     };
                     let low = if z > 0 {
-                        planes[2][at - stride]
+                        planes[2][self.place_of(x, z - 1)]
                     } else if wraps {
-                        planes[2][(self.rows - 1) * stride + x]
+                        planes[2][self.place_of(x, self.rows - 1)]
                     } else {
                         0.0
                     };

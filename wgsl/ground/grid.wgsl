@@ -55,9 +55,39 @@ struct Strip {
     group: i32,
     first: i32,
     end: i32,
-    /// Columns beside its cells, over the edge if it wraps.
+    /// Where its column starts, in vectors after a row's start.
+    column: i32,
+    /// Cells beside its own, over the edge if it wraps, in floats after a row's start.
     left: i32,
     right: i32,
+}
+
+/// Vectors a plane. A plane holds tile after tile, each with 32 rows of 8 vectors side by side in memory: rows that are read one after the other follow each other there.
+///
+/// internal
+fn plane_of(now: GroundStep) -> i32 {
+    return 256 * now.tiles;
+}
+
+/// Where a row starts in a plane, in vectors.
+///
+/// internal
+fn row_start(now: GroundStep, z: i32) -> i32 {
+    return (z >> 5u) * (256 * now.tiles_x) + 8 * (z & 31);
+}
+
+/// Where a group of four columns is after a row's start, in vectors.
+///
+/// internal
+fn column_start(group: i32) -> i32 {
+    return (group >> 3u) * 256 + (group & 7);
+}
+
+/// Where a column is after a row's start, in floats.
+///
+/// internal
+fn cell_start(x: i32) -> i32 {
+    return 4 * column_start(x >> 2u) + (x & 3);
 }
 
 /// The strip of a lane of a tile.
@@ -70,7 +100,7 @@ fn strip_of(now: GroundStep, tile: i32, lane: i32) -> Strip {
     let x = 4 * group;
     let left = select(x - 1, select(0, now.columns - 1, wraps), x == 0);
     let right = select(x + 4, select(now.columns - 1, 0, wraps), x + 4 >= now.columns);
-    return Strip(group, first, min(first + 32, now.rows), left, right);
+    return Strip(group, first, min(first + 32, now.rows), column_start(group), cell_start(left), cell_start(right));
 }
 
 /// A row, or what lies beyond the edge: the other edge, or the row itself.

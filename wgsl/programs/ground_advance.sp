@@ -4,7 +4,7 @@ Second half of a step of shallow water: discharges through the faces, each found
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, strip_of, row_at, columns_of, from_left, from_right, sourced, weather, running_mean}
+#import veduta::ground::grid::{GroundStep, strip_of, row_start, plane_of, row_at, columns_of, from_left, from_right, sourced, weather, running_mean}
 #import veduta::ground::shallow::{sill_depth, discharge}
 #import veduta::ground::exact::{add_exactly, opaque}
 
@@ -45,8 +45,7 @@ fn advance(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
     }
     let step = bitcast<f32>(atomicLoad(&tiles[1]));
     let scale = step / now.spacing;
-    let plane = now.groups * now.rows;
-    let stride = 4 * now.groups;
+    let plane = plane_of(now);
     let columns = columns_of(place.group);
     let last = columns == vec4<i32>(now.columns - 1);
     let inside = select(vec4<f32>(0.0), vec4<f32>(1.0), columns < vec4<i32>(now.columns));
@@ -60,18 +59,18 @@ fn advance(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
     var run_off = vec4<f32>(0.0);
     var stirs = vec4<f32>(0.0);
     var top = vec4<f32>(0.0);
-    let first_at = place.first * now.groups + place.group;
-    let low_at = row_at(now, place.first - 1) * now.groups + place.group;
+    let first_at = row_start(now, place.first) + place.column;
+    let low_at = row_start(now, row_at(now, place.first - 1)) + place.column;
     var here_water = water[first_at];
     var here_ground = ground[first_at];
     let low_wall = place.first == 0 && ends;
     var low_w = select(faces_z[low_at], vec4<f32>(0.0), vec4<bool>(low_wall));
     var low_qz = through(low_w, ground[low_at], water[low_at], here_ground, here_water);
     for (var z = place.first; z < place.end; z++) {
-        let at = z * now.groups + place.group;
-        let next = row_at(now, z + 1) * now.groups + place.group;
-        let left_at = z * stride + place.left;
-        let right_at = z * stride + place.right;
+        let at = row_start(now, z) + place.column;
+        let next = row_start(now, row_at(now, z + 1)) + place.column;
+        let left_at = 4 * row_start(now, z) + place.left;
+        let right_at = 4 * row_start(now, z) + place.right;
         let high_water = water[next];
         let high_ground = ground[next];
         let u = faces_x[at];

@@ -4,7 +4,7 @@ Changes of the ground and its water under a cursor, or everywhere. With GROUND_L
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, row_at, columns_of, from_left, from_right}
+#import veduta::ground::grid::{GroundStep, row_at, row_start, column_start, cell_start, plane_of, columns_of, from_left, from_right}
 #import veduta::ground::exact::{add_exactly}
 #import veduta::noise::value::{value_noise_2d}
 
@@ -18,8 +18,8 @@ fn edit(@builtin(global_invocation_id) id: vec3<u32>) {
     if i32(id.x) >= now.groups {
         return;
     }
-    let at = i32(id.y) * now.groups + i32(id.x);
-    ground[at] = (ground[now.groups * now.rows + at] - now.reference) + change[at];
+    let at = row_start(now, i32(id.y)) + column_start(i32(id.x));
+    ground[at] = (ground[plane_of(now) + at] - now.reference) + change[at];
 }
 #else
 struct Edit {
@@ -44,9 +44,10 @@ struct Edit {
 
 fn row(z: i32, group: i32, left: i32, right: i32, last: vec4<bool>) -> vec4<f32> {
     let at = row_at(now, z);
-    let here = ground[at * now.groups + group];
-    let l = 4 * at * now.groups + left;
-    let r = 4 * at * now.groups + right;
+    let start = row_start(now, at);
+    let here = ground[start + column_start(group)];
+    let l = 4 * start + cell_start(left);
+    let r = 4 * start + cell_start(right);
     // The weights 1, 2, 1 along x.
     return (2.0 * here + (from_left(here, ground[l >> 2u][l & 3]) + from_right(here, ground[r >> 2u][r & 3], last))) * 0.25;
 }
@@ -58,8 +59,8 @@ fn edit(@builtin(global_invocation_id) id: vec3<u32>) {
     if group >= now.groups {
         return;
     }
-    let plane = now.groups * now.rows;
-    let at = z * now.groups + group;
+    let plane = plane_of(now);
+    let at = row_start(now, z) + column_start(group);
     let columns = columns_of(group);
     let inside = select(vec4<f32>(0.0), vec4<f32>(1.0), columns < vec4<i32>(now.columns));
     let dx = vec4<f32>(columns) - tool.x;

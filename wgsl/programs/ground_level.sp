@@ -4,7 +4,7 @@ After a step of erosion: the ground over the reference level, from base and chan
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, strip_of}
+#import veduta::ground::grid::{GroundStep, strip_of, row_start, plane_of}
 
 @group(0) @binding(0) var<uniform> now: GroundStep;
 @group(1) @binding(0) var<storage, read> change: array<vec4<f32>>;
@@ -17,9 +17,9 @@ fn relevel(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
     if place.group >= now.groups {
         return;
     }
-    let plane = now.groups * now.rows;
+    let plane = plane_of(now);
     for (var z = place.first; z < place.end; z++) {
-        let at = z * now.groups + place.group;
+        let at = row_start(now, z) + place.column;
         ground[at] = (ground[plane + at] - now.reference) + change[at];
     }
 }

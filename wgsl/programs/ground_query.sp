@@ -4,7 +4,7 @@ Height, depth, velocity and normal of the ground at given places, between cells 
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep}
+#import veduta::ground::grid::{GroundStep, row_start, cell_start, plane_of}
 
 struct Found {
     height: f32,
@@ -23,7 +23,7 @@ struct Found {
 @group(2) @binding(0) var<storage, read_write> results: array<Found>;
 
 fn cell(x: i32, z: i32) -> i32 {
-    return clamp(z, 0, now.rows - 1) * 4 * now.groups + clamp(x, 0, now.columns - 1);
+    return 4 * row_start(now, clamp(z, 0, now.rows - 1)) + cell_start(clamp(x, 0, now.columns - 1));
 }
 
 fn height(x: i32, z: i32) -> f32 {
@@ -34,7 +34,7 @@ fn height(x: i32, z: i32) -> f32 {
 // Velocity in the middle of a cell: of `Physical` the mean of its faces, of the source's scheme what leaves to either side.
 fn velocity(x: i32, z: i32) -> vec2<f32> {
     let at = cell(x, z);
-    let plane = now.groups * now.rows;
+    let plane = plane_of(now);
     let near = vec2<f32>(speeds_x[at >> 2u][at & 3], speeds_z[at >> 2u][at & 3]);
     if now.scheme == 0 {
         return near - vec2<f32>(speeds_x[plane + (at >> 2u)][at & 3], speeds_z[plane + (at >> 2u)][at & 3]);

@@ -4,7 +4,7 @@ First half of a step of shallow water: speeds on the faces towards +x and +z, by
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, strip_of, row_at, columns_of, from_left, from_right}
+#import veduta::ground::grid::{GroundStep, strip_of, row_start, plane_of, row_at, columns_of, from_left, from_right}
 #import veduta::ground::exact::{opaque}
 #import veduta::ground::flow::{level_drop}
 #import veduta::ground::shallow::{sill_depth, rubbed_speed}
@@ -79,8 +79,7 @@ fn shallow(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
         return;
     }
     let step = bitcast<f32>(atomicLoad(&tiles[1]));
-    let plane = now.groups * now.rows;
-    let stride = 4 * now.groups;
+    let plane = plane_of(now);
     let columns = columns_of(place.group);
     let last = columns == vec4<i32>(now.columns - 1);
     let ends = now.boundary != 2;
@@ -88,13 +87,13 @@ fn shallow(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
     let has_right = select(vec4<f32>(1.0), vec4<f32>(0.0), (columns >= vec4<i32>(now.columns - 1)) & vec4<bool>(ends));
     let inside = select(vec4<f32>(0.0), vec4<f32>(1.0), columns < vec4<i32>(now.columns));
     let low_row = row_at(now, place.first - 1);
-    let low_at = low_row * now.groups + place.group;
-    let first_at = place.first * now.groups + place.group;
+    let low_at = row_start(now, low_row) + place.column;
+    let first_at = row_start(now, place.first) + place.column;
     var has_low = select(1.0, 0.0, place.first == 0 && ends);
     var low_u = old_x[low_at];
     var low_w = old_z[low_at] * has_low;
     var low_qz = old_z[plane + low_at] * has_low;
-    let low_end = 4 * low_at - 4 * place.group + place.right;
+    let low_end = 4 * row_start(now, low_row) + place.right;
     var low_qz_end = old_z[plane + (low_end >> 2u)][low_end & 3] * has_low;
     var u = old_x[first_at];
     var w = old_z[first_at];
@@ -102,15 +101,15 @@ fn shallow(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
     var qz = old_z[plane + first_at];
     var here_water = water[first_at];
     var here_ground = ground[first_at];
-    let first_left = place.first * stride + place.left;
+    let first_left = 4 * row_start(now, place.first) + place.left;
     var qx_left = has_left * from_left(qx, old_x[plane + (first_left >> 2u)][first_left & 3]);
     var stirs = vec4<f32>(0.0);
     for (var z = place.first; z < place.end; z++) {
-        let at = z * now.groups + place.group;
+        let at = row_start(now, z) + place.column;
         let high_row = row_at(now, z + 1);
-        let next = high_row * now.groups + place.group;
-        let left_at = z * stride + place.left;
-        let right_at = z * stride + place.right;
+        let next = row_start(now, high_row) + place.column;
+        let left_at = 4 * row_start(now, z) + place.left;
+        let right_at = 4 * row_start(now, z) + place.right;
         let left_group = left_at >> 2u;
         let right_group = right_at >> 2u;
         let left_lane = left_at & 3;
@@ -123,7 +122,7 @@ fn shallow(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
         let high_qz = old_z[plane + next];
         let high_water = water[next];
         let high_ground = ground[next];
-        let high_left = high_row * stride + place.left;
+        let high_left = 4 * row_start(now, high_row) + place.left;
         let high_qx_left = has_left * from_left(high_qx, old_x[plane + (high_left >> 2u)][high_left & 3]);
         let right_water = from_right(here_water, water[right_group][right_lane], last);
         let right_ground = from_right(here_ground, ground[right_group][right_lane], last);

@@ -4,7 +4,7 @@ First half of a step of the source's water: outflow speeds from differences of l
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, strip_of, row_at, columns_of, from_left, from_right}
+#import veduta::ground::grid::{GroundStep, strip_of, row_start, plane_of, row_at, columns_of, from_left, from_right}
 #import veduta::ground::flow::{level_drop, driven_speed, outflow_share}
 #import veduta::ground::exact::{opaque}
 #ifdef GROUND_EROSION
@@ -54,8 +54,7 @@ fn speeds(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id:
         return;
     }
     let step = now.step;
-    let plane = now.groups * now.rows;
-    let stride = 4 * now.groups;
+    let plane = plane_of(now);
     let columns = columns_of(place.group);
     let last = columns == vec4<i32>(now.columns - 1);
     let inside = select(vec4<f32>(0.0), vec4<f32>(1.0), columns < vec4<i32>(now.columns));
@@ -65,20 +64,20 @@ fn speeds(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id:
     let beyond_right = last & vec4<bool>(now.boundary != 2);
     let open_x = inside * select(vec4<f32>(1.0), vec4<f32>(0.0), beyond_left & vec4<bool>(walls));
     let open_right = inside * select(vec4<f32>(1.0), vec4<f32>(0.0), beyond_right & vec4<bool>(walls));
-    let before_row = row_at(now, place.first - 1) * now.groups + place.group;
-    let first_row = place.first * now.groups + place.group;
+    let before_row = row_start(now, row_at(now, place.first - 1)) + place.column;
+    let first_row = row_start(now, place.first) + place.column;
     var low_ground = ground[before_row];
     var low = low_ground + water[before_row];
     var here_ground = ground[first_row];
     var here_water = water[first_row];
     for (var z = place.first; z < place.end; z++) {
-        let at = z * now.groups + place.group;
-        let next = row_at(now, z + 1) * now.groups + place.group;
+        let at = row_start(now, z) + place.column;
+        let next = row_start(now, row_at(now, z + 1)) + place.column;
         let high_ground = ground[next];
         let high_water = water[next];
         let here = here_ground + here_water;
         let high = high_ground + high_water;
-        let row = z * stride;
+        let row = 4 * row_start(now, z);
         let beyond_low = vec4<bool>(z == 0 && now.boundary != 2);
         let beyond_high = vec4<bool>(z == now.rows - 1 && now.boundary != 2);
         // Open edges: the same ground without water.

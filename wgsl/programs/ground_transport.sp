@@ -4,7 +4,7 @@ Second half of a step of the source's water: water moves by the outflow speeds a
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, strip_of, row_at, columns_of, from_left, from_right, sourced, weather, running_mean}
+#import veduta::ground::grid::{GroundStep, strip_of, row_start, plane_of, row_at, columns_of, from_left, from_right, sourced, weather, running_mean}
 #import veduta::ground::flow::{mixed_speed}
 #import veduta::ground::exact::{add_exactly, opaque}
 
@@ -41,8 +41,7 @@ fn transport(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) 
         return;
     }
     let step = now.step;
-    let plane = now.groups * now.rows;
-    let stride = 4 * now.groups;
+    let plane = plane_of(now);
     let columns = columns_of(place.group);
     let last = columns == vec4<i32>(now.columns - 1);
     let inside = select(vec4<f32>(0.0), vec4<f32>(1.0), columns < vec4<i32>(now.columns));
@@ -56,26 +55,26 @@ fn transport(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) 
     var load_off = vec4<f32>(0.0);
     var stirs = vec4<f32>(0.0);
     let low_start = row_at(now, place.first - 1);
-    let at_start = place.first * now.groups + place.group;
-    var low_up = old_z[low_start * now.groups + place.group];
+    let at_start = row_start(now, place.first) + place.column;
+    var low_up = old_z[row_start(now, low_start) + place.column];
     var up = old_z[at_start];
     var down = old_z[plane + at_start];
 #ifdef GROUND_EROSION
-    var low_load = means[plane + low_start * now.groups + place.group];
+    var low_load = means[plane + row_start(now, low_start) + place.column];
     var here_load = means[plane + at_start];
 #endif
     for (var z = place.first; z < place.end; z++) {
-        let at = z * now.groups + place.group;
+        let at = row_start(now, z) + place.column;
         let high_row = row_at(now, z + 1);
-        let next = high_row * now.groups + place.group;
+        let next = row_start(now, high_row) + place.column;
         let high_up = old_z[next];
         let high_down = old_z[plane + next];
         let has_low = select(1.0, 0.0, z == 0 && ends);
         let has_high = select(1.0, 0.0, z == now.rows - 1 && ends);
         let right = old_x[at];
         let left = old_x[plane + at];
-        let left_at = z * stride + place.left;
-        let right_at = z * stride + place.right;
+        let left_at = 4 * row_start(now, z) + place.left;
+        let right_at = 4 * row_start(now, z) + place.right;
         // Speeds that arrive, by the direction that they have.
         let in_right = has_left * from_left(right, old_x[left_at >> 2u][left_at & 3]);
         let in_left = has_right * from_right(left, old_x[plane + (right_at >> 2u)][right_at & 3], last);
