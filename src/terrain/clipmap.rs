@@ -629,7 +629,8 @@ impl Clipmap {
         // A view that is shifted by less than a pixel keeps the sectors that it has.
         let [all, made, made_count] = self.sectors;
         let before = (first - made).rem_euclid(all);
-        if before + count > made_count || count + 6 < made_count {
+        let covered = made_count == all || before + count <= made_count;
+        if !covered || count + 6 < made_count {
             self.sectors[1] = (first - 1).rem_euclid(all);
             self.sectors[2] = (count + 2).min(all);
         }
