@@ -908,6 +908,13 @@ fn pairs_between(atmosphere: &Atmosphere) -> usize {
 /// Most pairs of orders between.
 const MOST_PAIRS: f64 = 16.0;
 
+/// Altitude, in thicknesses of the air, above which the sky's table holds codes, as in `veduta::atmosphere::sky_view`.
+const CODED: f64 = 0.1;
+
+/// Where the estimate of the brightest light is put in half precision, as a power of two: far above the numbers below 2^-14, which are coarse, and with room for
+/// what the estimate misses.
+const AIM: f64 = 8.0;
+
 /// What radiance in the tables of an eye is multiplied with, a power of two: so that half precision is enough from noon to night. It
 /// follows an estimate, in f64, of the brightest light that the eye sees scattered once.
 fn table_scale(atmosphere: &Atmosphere, altitude: f64, sun_mu: f64) -> f32 {
@@ -951,6 +958,9 @@ fn table_scale(atmosphere: &Atmosphere, altitude: f64, sun_mu: f64) -> f32 {
             }
         }
     }
-    let exponent = -brightest.max(1e-9).log2().round().clamp(-40.0, 4.0);
+    // The estimate is of the brightest place of all; half precision is even down to 6e-5 and ends at 65504, so that light is aimed above 1. Codes are even about 1.
+    let coded = altitude > CODED * top;
+    let aim = if coded { 0.0 } else { AIM };
+    let exponent = aim - brightest.max(1e-9).log2().round().clamp(-30.0, 4.0);
     exponent.exp2() as f32
 }

@@ -527,6 +527,85 @@ fn light_of_the_sky_on_planes_meets_paths() {
     }
 }
 
+/// Half precision ends at 65504 and is coarse below 6e-5: the brightest texel stays away from both.
+#[test]
+fn half_precision_holds_the_light_from_noon_to_night() {
+    for name in ["earth", "hazy", "thesis", "mars", "afra"] {
+        let air = named(name);
+        let mut tables = tables_of(&air, &quality(Preset::Low));
+        for altitude in [2.0, 9e3, 5e4, 0.999 * air.thickness] {
+            for sun in [90.0, 30.0, 3.0, 0.0, -6.0, -12.0, -15.0, -18.0_f64] {
+                let eye = Eye {
+                    altitude,
+                    to_sun: heading(sun.to_radians(), 0.0),
+                    ..NOON
+                };
+                let _ = prepare(&mut tables, &eye);
+                let data = gpu().read_texture(tables.sky().texture()).unwrap();
+                let brightest = data
+                    .as_chunks::<8>()
+                    .0
+                    .iter()
+                    .flat_map(|b| [0, 2, 4].map(|k| f16([b[k], b[k + 1]])))
+                    .fold(f64::NEG_INFINITY, f64::max);
+                println!("{name} {altitude:.0} m, sun {sun}: {brightest:.3e}");
+                assert!(brightest <= 16_384.0);
+                // Of codes and of nights nothing is asked.
+                if altitude <= 0.1 * air.thickness && sun > -14.0 {
+                    assert!(brightest >= 0.05);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn twilight_falls_all_around() {
+    let air = named("earth");
+    let ways: Vec<(f64, f64)> = (0..=12)
+        .flat_map(|a| [0.5, 3.0, 10.0, 40.0].map(|e| (15.0 * f64::from(a), e)))
+        .collect();
+    for preset in [Preset::High, Preset::Medium, Preset::Low] {
+        // By tenths of a degree, and where it is darkest by fiftieths.
+        for (first, step, count) in [(-6.0, 0.1, 120), (-14.0, 0.02, 100)] {
+            let rays: Vec<ProbeRay> = (0..=count)
+                .flat_map(|i| {
+                    let sun = (first - step * f64::from(i)).to_radians();
+                    ways.iter().map(move |(azimuth, elevation)| ProbeRay {
+                        altitude: 2.0,
+                        dir: heading(elevation.to_radians(), azimuth.to_radians()),
+                        to_sun: heading(sun, 0.0),
+                        distance: FAR,
+                    })
+                })
+                .collect();
+            let found = fast(&air, &quality(preset.clone()), &rays);
+            let (mut worst, mut at) = (f64::NEG_INFINITY, (0, 0, 0));
+            for i in 1..=count as usize {
+                for k in 0..ways.len() {
+                    for c in 0..3 {
+                        let before = f64::from(found[(i - 1) * ways.len() + k].in_scatter[c]);
+                        let after = f64::from(found[i * ways.len() + k].in_scatter[c]);
+                        let rise = after / before - 1.0;
+                        assert!(rise.is_finite());
+                        if rise > worst {
+                            (worst, at) = (rise, (i, k, c));
+                        }
+                    }
+                }
+            }
+            let (i, k, c) = at;
+            println!(
+                "{preset:?} by {step}: {:.2} % at {:.2}, {:?}, {c}",
+                100.0 * worst,
+                first - step * i as f64,
+                ways[k]
+            );
+            assert!(worst < 0.0);
+        }
+    }
+}
+
 #[test]
 fn twilight_falls_with_every_tenth_of_a_degree() {
     let air = named("earth");
