@@ -44,9 +44,9 @@ pub struct Targets {
     pub depth_format: Option<wgpu::TextureFormat>,
     /// Samples a pixel of the pass, at least 1.
     pub sample_count: u32,
-    /// How depth grows; the landscape neither reads nor writes depth yet, and every value gives the same picture.
+    /// How depth grows. `Landscape` neither reads nor writes depth; `Sky`, `Terrain` and `Clouds` do, and refuse a view whose projection grows otherwise.
     pub depth: Depth,
-    /// How the host projects; as with depth, nothing depends on it yet.
+    /// How the host projects; as with depth.
     pub projection: Projection,
 }
 

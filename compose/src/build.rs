@@ -42,6 +42,8 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         "sky" => &[
             &[],
             &["SUN_DISC"],
+            &["SKY_MARCH"],
+            &["SKY_MARCH", "SUN_DISC"],
             &["AERIAL"],
             &["AERIAL", "AERIAL_TARGETS"],
             &["AERIAL", "AERIAL_ALPHA"],

@@ -442,6 +442,9 @@ impl Layer {
     }
 }
 
+/// The least angular radius (rad) over which light of higher orders fades in at the edge of the planet's shadow: smaller suns would fall between its table's columns.
+const SMALLEST_FADE: f64 = 0.002;
+
 impl Atmosphere {
     /// Checks every field against its domain.
     ///
@@ -511,6 +514,7 @@ impl Atmosphere {
         if let Some(peak) = self.peak() {
             words[3..6].copy_from_slice(&[peak.g, peak.level, peak.square].map(bits));
         }
+        words[6] = bits(self.sun.angular_radius.max(SMALLEST_FADE));
         words[8..11].copy_from_slice(&self.ground_albedo.map(bits));
         for (i, lane) in lanes.iter().enumerate() {
             let lobe = lane.lobe.map_or([0.0; 5], |lobe| {

@@ -184,10 +184,10 @@ pub(super) fn checked(ray: &ProbeRay, at: usize) -> Result<ProbeRay, Error> {
 }
 
 impl Probe {
-    /// Builds the pipeline and uploads the air.
+    /// Builds the pipeline and uploads the air. It marches light that is scattered once: `quality` is not read.
     ///
     /// # Errors
-    /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for counts; the faults of [`ProgramSet::get`] and of making the pipeline.
+    /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for counts, and for a path or orders that it does not follow, which [`probe`] and [`FastProbe`] do; the faults of [`ProgramSet::get`] and of making the pipeline.
     pub fn new(
         device: &wgpu::Device,
         programs: &ProgramSet,
@@ -195,6 +195,13 @@ impl Probe {
         options: &ProbeOptions,
     ) -> Result<Probe, Error> {
         let bytes = atmosphere.air_bytes()?;
+        if options.path != ProbePath::Textbook || options.orders != Orders::Single {
+            return Err(outside(
+                "path and orders",
+                format!("{:?} and {:?}", options.path, options.orders),
+                "Textbook and Single; `FastProbe` and `probe` have the others",
+            ));
+        }
         let (steps, light_steps) = (u64::from(options.steps), u64::from(options.light_steps));
         for (name, count) in [("steps", steps), ("light_steps", light_steps)] {
             if !(1..=4096).contains(&count) {
@@ -312,7 +319,7 @@ impl Probe {
 }
 
 /// The light along rays, on the device: straight from the sun along the path `Textbook` by marching to the sun from every sample; of all
-/// orders along it by marching through the finest tables of the air; along the path `Fast` from the tables of each ray's eye. For more than one
+/// orders along it by marching 64 steps through the finest tables of the air, whatever counts and quality say; along the path `Fast` from the tables of each ray's eye. For more than one
 /// batch of rays keep a [`Probe`] or a [`FastProbe`].
 ///
 /// # Errors

@@ -98,7 +98,7 @@ const RESULT: usize = 32;
 const MOST_WORKGROUPS: usize = 65_535;
 
 impl SkyQuery {
-    /// Builds the pipeline; the tables that are asked later must be of this air or of one with as many lobes.
+    /// Builds the pipeline; the tables that are asked later must be of this air or of one with the same [`Atmosphere::features`].
     ///
     /// # Errors
     /// The faults of [`ProgramSet::get`] and of making the pipeline.
@@ -138,7 +138,11 @@ impl SkyQuery {
         };
         if tables.atmosphere().features() != self.features {
             let lobes = tables.atmosphere().lanes().len();
-            return fault("tables", lobes, "as many lobes as those of the query's air");
+            return fault(
+                "tables",
+                lobes,
+                "air with the same `Atmosphere::features` as the query's",
+            );
         }
         if !tables.quality().all_orders {
             return fault("tables.all_orders", 0, "on");

@@ -38,6 +38,9 @@ pub struct SkyOptions {
     pub atmosphere: Atmosphere,
     /// How the sky comes together with what the host has drawn.
     pub composition: SkyComposition,
+    /// `None`: from the tables. Else the textbook path, for an eye within the air's lower tenth and behind things ([`SkyComposition::Background`]) alone: every pixel marches so many
+    /// steps along its ray, in [1, 512], and so many from each sample to the sun, in [1, 64], and has the light that is scattered once.
+    pub march: Option<[u32; 2]>,
 }
 
 impl Default for SkyOptions {
@@ -47,6 +50,7 @@ impl Default for SkyOptions {
             preset: Preset::High,
             atmosphere: Atmosphere::default(),
             composition: SkyComposition::default(),
+            march: None,
         }
     }
 }
@@ -111,6 +115,8 @@ struct Layer {
     pipeline: wgpu::RenderPipeline,
     layouts: Vec<wgpu::BindGroupLayout>,
     groups: Vec<wgpu::BindGroup>,
+    /// Of the host's too.
+    bindings: u32,
 }
 
 /// What is drawn: the sky, and over it the sun's disc in a square of its own, so that no other pixel pays for it.
@@ -130,6 +136,7 @@ struct PassMaker {
     depth_stencil: Option<wgpu::DepthStencilState>,
     sample_count: u32,
     output: f64,
+    march: [u32; 2],
 }
 
 impl PassMaker {
@@ -157,10 +164,11 @@ impl PassMaker {
             .overrides
             .iter()
             .map(|o| {
-                let value = if o.name == "OUTPUT" {
-                    self.output
-                } else {
-                    f64::from(place as u8)
+                let value = match o.name.as_ref() {
+                    "OUTPUT" => self.output,
+                    "MARCH_STEPS" => f64::from(self.march[0]),
+                    "MARCH_LIGHT_STEPS" => f64::from(self.march[1]),
+                    _ => f64::from(place as u8),
                 };
                 (o.name.as_ref(), value)
             })
@@ -209,13 +217,14 @@ impl PassMaker {
         let groups = bind_groups(
             &self.device,
             "veduta sky",
-            &layouts[..2],
+            &layouts[..layouts.len().min(2)],
             &[&first, &second],
         );
         Ok(Layer {
             pipeline,
             layouts,
             groups,
+            bindings: program.bindings.len() as u32,
         })
     }
 }
@@ -251,11 +260,28 @@ impl Sky {
                     .to_owned(),
             });
         }
+        let march = options.march.unwrap_or([0, 0]);
+        if options.march.is_some() {
+            let [steps, light_steps] = march.map(u64::from);
+            let fits = (1..=512).contains(&steps)
+                && (1..=64).contains(&light_steps)
+                && 4 * steps * (2 * light_steps + 3) < 65_520;
+            if reads_depth || !fits {
+                return Err(fault(
+                    "march",
+                    format!("{march:?} with {:?}", options.composition),
+                    "Background with steps in [1, 512] and steps to the sun in [1, 64] of which 4 steps (2 light steps + 3) stays below 65,520",
+                ));
+            }
+        }
         let settings = Settings::resolve(programs, &options.preset, None, &[])?;
         let quality = SkyQuality::of(&settings);
         let tables =
             SkyTables::of_sky(device, programs, &options.atmosphere, &quality, reads_depth)?;
         let mut features = options.atmosphere.features().to_vec();
+        if options.march.is_some() {
+            features.push("SKY_MARCH");
+        }
         match options.composition {
             SkyComposition::Background => {}
             SkyComposition::OverPicture => features.push("AERIAL"),
@@ -300,6 +326,7 @@ impl Sky {
             depth_stencil,
             sample_count: targets.sample_count,
             output,
+            march,
         };
         let mut sky = Sky {
             tables,
@@ -353,23 +380,36 @@ impl Sky {
             bind_groups: tables.bind_groups
                 + layers().map(|l| l.groups.len() as u32).sum::<u32>()
                 + u32::from(self.host.is_some()),
-            bindings: tables.bindings + 7 * layers().count() as u32,
+            bindings: tables.bindings + layers().map(|l| l.bindings).sum::<u32>(),
             buffers: tables.buffers + 1,
             buffer_bytes: tables.buffer_bytes + self.draw.size(),
             ..tables
         }
     }
 
-    /// Tells which pictures of the host [`Sky::composite`] reads: its depth, and for `OverPicture` its scene radiance. Again after each change of size.
+    /// Tells which pictures of the host [`Sky::composite`] reads: its depth, and for `OverPicture` its scene radiance, as large as the target. Again after each change of
+    /// size. Of a format with stencil the view has to be of the depth alone.
     ///
     /// # Errors
-    /// [`Error::OutOfDomain`] for a sky that reads none, and for a missing picture.
+    /// [`Error::OutOfDomain`] for a sky that reads none, for a missing picture, for one of another kind (format, samples, usage), and for two of different sizes.
     pub fn set_host(
         &mut self,
         device: &wgpu::Device,
         depth: &wgpu::TextureView,
         picture: Option<&wgpu::TextureView>,
     ) -> Result<(), Error> {
+        check_host("depth", depth, true)?;
+        if let Some(picture) = picture.filter(|_| self.composition == SkyComposition::OverPicture) {
+            check_host("picture", picture, false)?;
+            let size = |view: &wgpu::TextureView| [view.texture().width(), view.texture().height()];
+            if size(picture) != size(depth) {
+                return Err(fault(
+                    "picture",
+                    format!("{:?} pixels", size(picture)),
+                    &format!("{:?}, as the depth has", size(depth)),
+                ));
+            }
+        }
         let mut bound = vec![(0, wgpu::BindingResource::TextureView(depth))];
         match (self.composition, picture) {
             (SkyComposition::Background | SkyComposition::OverPictureWithAlpha, _) => {
@@ -399,7 +439,7 @@ impl Sky {
     /// thousandth of the depth. Before [`Sky::prepare`], which uploads the depth.
     ///
     /// # Errors
-    /// [`Error::OutOfDomain`] for a sky of another composition and for a depth out of its domain.
+    /// [`Error::OutOfDomain`] for a sky of another composition, for a depth out of its domain, and for a picture of another kind (format, samples, usage).
     pub fn set_host_with_alpha(
         &mut self,
         device: &wgpu::Device,
@@ -420,6 +460,7 @@ impl Sky {
                 "in [1, 1e12] m",
             ));
         }
+        check_host("picture", picture, false)?;
         self.greatest_depth = greatest_depth;
         self.bind_host(device, &[(1, wgpu::BindingResource::TextureView(picture))])
     }
@@ -465,7 +506,6 @@ impl Sky {
         );
         let mut block = draw_block(&self.targets, reads_depth, colour, view)?;
         block.greatest_depth = self.greatest_depth;
-        let mut work = self.tables.prepare(queue, encoder, &eye)?;
         let altitude = eye.altitude as f32;
         let top = self.tables.atmosphere().thickness as f32;
         // As `sky_coded` of the modules has it.
@@ -476,8 +516,22 @@ impl Sky {
         } else {
             EyePlace::Low
         };
+        if self.maker.march != [0, 0] && self.place != EyePlace::Low {
+            return Err(fault(
+                "view.eye",
+                format!("{altitude} m"),
+                "within the lower tenth of the air, for a sky that is marched",
+            ));
+        }
         self.pass(self.place)?;
         self.shows = self.in_view(&block, &eye);
+        // A view that shows neither air nor sun reads no table.
+        let mut work = if self.shows == [false; 2] {
+            eye.check()?;
+            Work::default()
+        } else {
+            self.tables.prepare(queue, encoder, &eye)?
+        };
         let bytes = block.to_bytes().to_vec();
         if bytes != self.draw_bytes {
             queue.write_buffer(&self.draw, 0, &bytes);
@@ -548,6 +602,44 @@ impl Sky {
         }
         Ok(work)
     }
+}
+
+/// Whether a host's picture can be read as depth, or as colour.
+pub(crate) fn check_host(name: &str, view: &wgpu::TextureView, depth: bool) -> Result<(), Error> {
+    let texture = view.texture();
+    let format = texture.format();
+    let kind = if depth {
+        format.has_depth_aspect()
+    } else {
+        matches!(
+            format.sample_type(None, None),
+            Some(wgpu::TextureSampleType::Float { .. })
+        )
+    };
+    let read = texture
+        .usage()
+        .contains(wgpu::TextureUsages::TEXTURE_BINDING);
+    if kind
+        && read
+        && texture.sample_count() == 1
+        && texture.dimension() == wgpu::TextureDimension::D2
+    {
+        return Ok(());
+    }
+    Err(fault(
+        name,
+        format!(
+            "{:?} {format:?}, {} samples, {:?}",
+            texture.dimension(),
+            texture.sample_count(),
+            texture.usage()
+        ),
+        if depth {
+            "a flat depth texture of one sample with the usage TEXTURE_BINDING"
+        } else {
+            "a flat float texture of one sample with the usage TEXTURE_BINDING"
+        },
+    ))
 }
 
 fn fault(name: &str, value: String, domain: &str) -> Error {

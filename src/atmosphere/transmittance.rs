@@ -23,7 +23,7 @@ pub struct TransmittanceTable {
 }
 
 impl TransmittanceTable {
-    /// Makes texture and pipeline for airs with as many lobes as this one: at most four, or more. `size` is zenith angles by altitudes, each in
+    /// Makes texture and pipeline for airs with the same [`Atmosphere::features`] as this one. `size` is zenith angles by altitudes, each in
     /// `[2, 1024]`; 128 x 64 is right to 0.0025 for 99 of 100 paths.
     ///
     /// # Errors
@@ -78,7 +78,7 @@ impl TransmittanceTable {
     /// Records the table when the air is another than before.
     ///
     /// # Errors
-    /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for an air with more than four lobes when that of [`TransmittanceTable::new`] had fewer, or
+    /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for an air with other [`Atmosphere::features`] than that of [`TransmittanceTable::new`], or
     /// the other way round.
     pub fn prepare(
         &mut self,

@@ -888,6 +888,19 @@ fn what_the_view_does_not_show_is_not_drawn() {
     assert_eq!(draws(&looking(2.0, [0.0, 20.0, 50.0], [20.0, 180.0])), 1);
     assert_eq!(draws(&looking(2.0, [0.0, 0.0, 50.0], [-3.0, 0.0])), 1);
     // From space: away from the planet with the sun behind and before, and at its limb.
+    let mut fresh = background(Preset::Low);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let mut prepared = |yaw: f64, pitch: f64| {
+        let view = looking(2e7, [yaw, pitch, 50.0], [20.0, 180.0]);
+        fresh
+            .prepare(&gpu.queue, &mut encoder, &view)
+            .unwrap()
+            .bakes
+    };
+    // No table is made for a view without air, and all are once it shows.
+    assert_eq!(prepared(0.0, 40.0), 0);
+    assert!(prepared(0.0, -60.0) > 3);
+    assert_eq!(prepared(10.0, -60.0), 0);
     assert_eq!(draws(&looking(2e7, [0.0, 40.0, 50.0], [20.0, 180.0])), 0);
     assert_eq!(draws(&looking(2e7, [0.0, 40.0, 50.0], [40.0, 0.0])), 1);
     assert_eq!(draws(&looking(2e7, [0.0, -60.0, 50.0], [40.0, 0.0])), 1);
@@ -1171,6 +1184,78 @@ fn faults_have_names() {
         "view.projection",
     );
 
+    // Pictures of the wrong kind.
+    let binding = wgpu::TextureUsages::TEXTURE_BINDING;
+    let colour = view_of(&texture(FLOAT, 1, binding));
+    for wrong in [
+        colour.clone(),
+        view_of(&texture(
+            wgpu::TextureFormat::Depth32Float,
+            1,
+            wgpu::TextureUsages::RENDER_ATTACHMENT,
+        )),
+    ] {
+        named(
+            over.set_host(&gpu.device, &wrong, Some(&colour))
+                .unwrap_err(),
+            "depth",
+        );
+    }
+    let integers = view_of(&texture(wgpu::TextureFormat::Rgba32Uint, 1, binding));
+    for wrong in [&depth, &integers] {
+        named(
+            over.set_host(&gpu.device, &depth, Some(wrong)).unwrap_err(),
+            "picture",
+        );
+    }
+    let small = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d {
+            width: 8,
+            height: 8,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: FLOAT,
+        usage: binding,
+        view_formats: &[],
+    });
+    named(
+        over.set_host(&gpu.device, &depth, Some(&view_of(&small)))
+            .unwrap_err(),
+        "picture",
+    );
+    over.set_host(&gpu.device, &depth, Some(&colour)).unwrap();
+
+    // The textbook path.
+    let march = |counts, composition| {
+        let options = SkyOptions {
+            preset: Preset::Low,
+            composition,
+            march: Some(counts),
+            ..Default::default()
+        };
+        Sky::new(&gpu.device, veduta::programs(), &plain, &options)
+    };
+    for (counts, composition) in [
+        ([0, 4], SkyComposition::Background),
+        ([4, 65], SkyComposition::Background),
+        ([512, 64], SkyComposition::Background),
+        ([4, 4], SkyComposition::OverPicture),
+    ] {
+        named(march(counts, composition).unwrap_err(), "march");
+    }
+    let high = looking(5e4, [0.0; 3].map(|_| 30.0), [30.0, 0.0]);
+    named(
+        march([4, 4], SkyComposition::Background)
+            .unwrap()
+            .prepare(&gpu.queue, &mut encoder, &high)
+            .unwrap_err(),
+        "view.eye",
+    );
+
     let mut sky = new(&plain, SkyComposition::Background).unwrap();
     named(
         sky.set_host(&gpu.device, &depth, None).unwrap_err(),
@@ -1347,6 +1432,77 @@ fn arcs_of_the_sky_are_as_smooth_as_the_reference() {
 }
 
 /// Pictures of the tables of `Sky`, which show the ground and share reads between pixels (`sky_seen_by_pair`, and `sky_seen` where nothing is shared), against rays read from tables of the finest quality.
+#[test]
+fn a_marched_sky_is_that_of_the_reference() {
+    let air = Atmosphere::default();
+    let options = SkyOptions {
+        preset: Preset::Low,
+        march: Some([32, 16]),
+        ..Default::default()
+    };
+    let targets = targets(Depth::default(), Projection::default());
+    let mut sky = Sky::new(&gpu().device, veduta::programs(), &targets, &options).unwrap();
+    let irradiance =
+        View::default().sun.irradiance * Vec3::from_array(air.sun.colour.map(|c| c as f32));
+    let truth = Truth::new(&air).unwrap();
+    for (altitude, pitch, height) in [(2.0, 12.0, 40.0), (3e3, 0.0, 5.0), (2.0, 10.0, -3.0)] {
+        let view = looking(altitude, [150.0, pitch, 50.0], [height, 0.0]);
+        let shown = shoot(&mut sky, &view);
+        let mut worst = 0.0_f64;
+        for i in (0..PIXELS).step_by(97) {
+            let ray = SkyRay {
+                eye_altitude: altitude,
+                dir: ray_of(&view, i).normalize().to_array(),
+                to_sun: view.sun.to_light.as_dvec3().normalize().to_array(),
+                distance: f64::INFINITY,
+            };
+            let light = truth.single_scatter(&ray, 1e-6).in_scatter;
+            for c in 0..3 {
+                let found = f64::from(shown.pixels[i][c] / irradiance[c]);
+                worst = worst.max((found - light[c]).abs() / light[c].max(1e-6));
+            }
+        }
+        println!("{altitude} m, sun at {height}: {worst:.1e}");
+        assert!(worst < 2e-3);
+    }
+}
+
+#[test]
+fn no_eye_is_too_low_or_too_high_for_a_picture() {
+    let top = Atmosphere::default().thickness as f32;
+    for composition in [SkyComposition::Background, SkyComposition::OverPicture] {
+        let targets = targets(Depth::default(), Projection::default());
+        let mut sky = sky_with(&targets, composition, Preset::Low);
+        if composition == SkyComposition::OverPicture {
+            let depths: Vec<f32> = (0..PIXELS).map(|i| [0.0, 1e-3, 1e-7][i % 3]).collect();
+            let colour = upload(FLOAT, &vec![0.5; 4 * PIXELS]);
+            sky.set_host(&gpu().device, &depth_buffer(&depths), Some(&colour))
+                .unwrap();
+        }
+        for altitude in [
+            0.0,
+            1.7,
+            f64::from(top.next_down()),
+            f64::from(top),
+            f64::from(top.next_up()),
+            1e8,
+        ] {
+            for height in [90.0, 0.0, -18.0, -90.0] {
+                for pitch in [-89.0, -30.0, 0.0, 60.0] {
+                    let view = looking(altitude, [20.0, pitch, 60.0], [height, 40.0]);
+                    let picture = shoot(&mut sky, &view);
+                    assert_eq!(picture.not_finite(), 0, "{altitude} {height} {pitch}");
+                    let negative = picture
+                        .pixels
+                        .iter()
+                        .any(|p| p[..3].iter().any(|v| *v < 0.0));
+                    assert!(!negative, "{altitude} {height} {pitch}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn what_the_sky_draws_is_what_the_probe_finds() {
     let gpu = gpu();

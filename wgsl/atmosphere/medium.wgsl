@@ -63,6 +63,8 @@ struct Air {
     peak_level: f32,
     /// Its coefficient of nu^2 [1/sr].
     peak_square: f32,
+    /// Angular radius of the sun's disc by which light of higher orders fades over the planet's shadow [rad].
+    sun_radius: f32,
     /// Albedo of the ground.
     ground_albedo: vec3<f32>,
     /// Lanes 0 to 3.

@@ -83,7 +83,7 @@ fn order_moments(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>,
                 let extinction = air_extinction(air, densities);
                 var source = vec3<f32>(0.0);
                 if from_sun {
-                    let lit = sun_above_horizon(air.ground_radius, altitude, there_sun, 0.005);
+                    let lit = sun_above_horizon(air.ground_radius, altitude, there_sun, air.sun_radius);
                     if lit > 0.0 {
                         let sun = lit * exp(-sun_depth(columns, linear, air, altitude, there_sun));
                         source = sun * air_scattering(air, densities, phases);

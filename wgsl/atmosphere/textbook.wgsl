@@ -4,7 +4,7 @@
 #define_import_path veduta::atmosphere::textbook
 
 #import veduta::atmosphere::medium::{Air, Lanes, air_densities, air_extinction, air_scattering, air_phases}
-#import veduta::atmosphere::ray::{AirRay, AirLight, ray_altitude, ray_sun_cosine, lowest_distance}
+#import veduta::atmosphere::ray::{AirRay, AirLight, air_ray, ray_altitude, ray_sun_cosine, lowest_distance}
 #import veduta::atmosphere::columns::{path_to_top, sun_depth}
 #import veduta::atmosphere::diffuse::{diffuse_moments, diffuse_source}
 #import veduta::planet::shell::{altitude_along}
@@ -235,4 +235,11 @@ fn march_air_columns(columns: texture_2d_array<f32>, moments: texture_2d_array<f
         }
     }
     return AirLight(light, exp(-depth));
+}
+
+/// Light of a sun of irradiance 1 that is scattered once towards an eye at an altitude [m], from the direction `dir`.
+///
+/// internal
+fn march_sky(air: Air, altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, steps: i32, light_steps: i32) -> vec3<f32> {
+    return march_air(air, air_ray(air.ground_radius, air.top, altitude, dir, to_sun, 1e9), steps, light_steps).in_scatter;
 }

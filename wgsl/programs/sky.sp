@@ -85,6 +85,9 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #ifndef AERIAL
 #import veduta::atmosphere::sky_view::{sky_seen_by_pair}
 #endif
+#ifdef SKY_MARCH
+#import veduta::atmosphere::textbook::{march_sky}
+#endif
 #ifdef AERIAL
 #import veduta::atmosphere::ray::{AirLight, air_ray}
 #import veduta::atmosphere::aerial::{aerial_light}
@@ -127,6 +130,11 @@ override OUTPUT: i32 = 0;
 // Where the eye is: 0 low in the air, 1 so high that its table holds codes, 2 above the air.
 override EYE_PLACE: i32 = 0;
 
+#ifdef SKY_MARCH
+override MARCH_STEPS: i32 = 16;
+override MARCH_LIGHT_STEPS: i32 = 8;
+#endif
+
 fn place_of(dir: vec3<f32>) -> SkyPlace {
     if EYE_PLACE == 2 {
         return sky_place_outside(eye, dir);
@@ -136,10 +144,14 @@ fn place_of(dir: vec3<f32>) -> SkyPlace {
 
 // Behind the host's things: the sky, or the bare ground and the air before it.
 fn background(ray: vec3<f32>) -> vec3<f32> {
+#ifdef SKY_MARCH
+    return march_sky(air, eye.altitude, normalize(ray), eye.to_sun, MARCH_STEPS, MARCH_LIGHT_STEPS);
+#else
     if EYE_PLACE != 0 {
         return sky_radiance(sky, linear, air, eye, place_of(normalize(ray)), true);
     }
     return sky_seen(sky, linear, look, ray);
+#endif
 }
 
 #ifdef AERIAL
@@ -304,11 +316,15 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     let radiance = background(dir) + disc(dir, dpdx(dir), dpdy(dir));
 #else
     var radiance = vec3<f32>(0.0);
+#ifdef SKY_MARCH
+    radiance = background(ray);
+#else
     if EYE_PLACE != 0 {
         radiance = background(ray);
     } else {
         radiance = sky_seen_by_pair(sky, linear, look, ray, in.position.xy);
     }
+#endif
 #endif
     return shown(radiance * draw_view.sun_irradiance, in.position.xy);
 }

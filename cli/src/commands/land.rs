@@ -192,6 +192,7 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
             preset,
             atmosphere: air,
             composition: SkyComposition::OverPicture,
+            march: None,
         };
         let over = Targets {
             depth_format: None,

@@ -151,6 +151,7 @@ pub fn run(args: &SkyArgs) -> Result<(), CliError> {
         preset: Preset::Named(args.preset.clone().into()),
         atmosphere: atmosphere(&args.atmosphere)?,
         composition: SkyComposition::Background,
+        march: None,
     };
     let format = veduta::wgpu::TextureFormat::Rgba32Float;
     let targets = Targets {

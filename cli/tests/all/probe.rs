@@ -120,6 +120,51 @@ fn the_reference_is_that_of_the_library() {
     assert_eq!(once[3..6], light[3..6]);
 }
 
+/// Every path and both orders find the light of the reference: once scattered to 3 %, of all orders to 8 % and what paths leave open.
+#[test]
+fn every_path_meets_the_reference() {
+    let dir = folder("probe_paths");
+    let rows: Vec<[f64; 8]> = [0.3_f64, 1.0, 1.4]
+        .iter()
+        .flat_map(|zenith| {
+            let (up, flat) = (zenith.cos(), zenith.sin());
+            [[2.0, flat], [5000.0, -flat]]
+                .map(|[h, x]| [h, x, up, 0.0, 0.8, 0.6, 0.0, f64::INFINITY])
+        })
+        .collect();
+    write(&dir.join("rays.npy"), &rows);
+    let run = |path: &str, orders: &str, out: &str| {
+        let line = [
+            "probe", "sky", "--rays", "rays.npy", "--path", path, "--orders", orders, "--out", out,
+        ];
+        let samples = ["--samples", "20000", "--errors", "e.npy"];
+        let reference = path == "reference" && orders == "all";
+        let line = [&line[..], if reference { &samples } else { &[] }].concat();
+        veduta(&dir, &line).good();
+        let (shape, light) = read(&dir.join(out));
+        assert_eq!(shape, [6, 6]);
+        light
+    };
+    for (orders, bar) in [("single", 0.03), ("all", 0.08)] {
+        let truth = run("reference", orders, "t.npy");
+        let own = match orders {
+            "all" => read(&dir.join("e.npy")).1,
+            _ => vec![0.0; 18],
+        };
+        for path in ["textbook", "fast"] {
+            let found = run(path, orders, "f.npy");
+            for (i, (f, t)) in found.iter().zip(&truth).enumerate() {
+                let (ray, c) = (i / 6, i % 6);
+                let open = if c < 3 { 3.0 * own[3 * ray + c] } else { 0.0 };
+                assert!(
+                    (f - t).abs() <= bar * t + open,
+                    "{path} {orders} ray {ray}, {c}: {f} of {t}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn what_does_not_fit_is_named() {
     let dir = folder("probe_faults");
