@@ -452,7 +452,8 @@ impl Atmosphere {
     /// [`Error::OutOfDomain`] for the first one outside.
     pub fn check(&self) -> Result<(), Error> {
         within("planet_radius", self.planet_radius, (1e3, 1e9, "m"))?;
-        within("thickness", self.thickness, (1.0, 1e7, "m"))?;
+        let most = self.planet_radius.min(1e7);
+        within("thickness", self.thickness, (1.0, most, "m"))?;
         each_within("ground_albedo", self.ground_albedo, (0.0, 1.0, "1"))?;
         within(
             "sun.angular_radius",

@@ -982,6 +982,168 @@ fn another_planet_needs_no_other_code() {
     }
 }
 
+/// Row A18 by numbers: light scattered once over planets of other sizes, against quadrature.
+#[test]
+fn the_air_of_planets_of_all_sizes_meets_quadrature() {
+    for (radius, thickness, bar) in [
+        (5e5, 1e5, 0.03),
+        (2e6, 4e5, 0.03),
+        (7e7, 1e5, 0.04),
+        (1e9, 2e5, 0.08),
+    ] {
+        let mut air = Atmosphere::named("thesis").unwrap();
+        air.planet_radius = radius;
+        air.thickness = thickness;
+        let truth = Truth::new(&air).unwrap();
+        let mut rays = Vec::new();
+        for altitude in [2.0, 0.05 * thickness, 3.0 * thickness] {
+            let dip = (radius / (radius + altitude)).acos();
+            for elevation in [0.02, 0.3, 1.2] {
+                for sun in [0.05, 0.6, 1.3] {
+                    rays.push(ProbeRay {
+                        altitude,
+                        dir: direction(elevation - dip * f64::from(altitude > 3.0), 0.7).to_array(),
+                        to_sun: direction(sun, 0.0).to_array(),
+                        distance: f64::INFINITY,
+                    });
+                }
+            }
+        }
+        let quality = SkyQuality {
+            all_orders: false,
+            ..quality(&Preset::High)
+        };
+        let found = FastProbe::new(&gpu().device, veduta::programs(), &air, &quality, 0)
+            .and_then(|mut p| p.run(&gpu().device, &gpu().queue, &rays))
+            .unwrap();
+        let mut worst = 0.0_f64;
+        for (ray, found) in rays.iter().zip(&found) {
+            let light = truth.single_scatter(
+                &SkyRay {
+                    eye_altitude: ray.altitude,
+                    dir: ray.dir,
+                    to_sun: ray.to_sun,
+                    distance: ray.distance,
+                },
+                1e-6,
+            );
+            for c in 0..3 {
+                let off = f64::from(found.in_scatter[c]) - light.in_scatter[c];
+                let off = off.abs() / light.in_scatter[c].max(1e-6);
+                worst = worst.max(off);
+            }
+        }
+        println!("{radius:.0e} m: {:.2} %", 100.0 * worst);
+        assert!(worst < bar);
+    }
+}
+
+/// Row A15: the ground that a picture shows is that of its albedo under sun and sky, behind the air before it.
+#[test]
+fn the_bare_ground_reflects_sun_and_sky() {
+    let gpu = gpu();
+    let mut air = Atmosphere::default();
+    air.ground_albedo = [0.6, 0.4, 0.2];
+    let options = SkyOptions {
+        atmosphere: air.clone(),
+        ..Default::default()
+    };
+    let targets = targets(Depth::default(), Projection::default());
+    let mut sky = Sky::new(&gpu.device, veduta::programs(), &targets, &options).unwrap();
+    let query = SkyQuery::new(&gpu.device, veduta::programs(), &air).unwrap();
+    let irradiance =
+        View::default().sun.irradiance * Vec3::from_array(air.sun.colour.map(|c| c as f32));
+    for (altitude, height) in [(500.0, 60.0), (500.0, 12.0), (8e3, 30.0), (9e4, 50.0)] {
+        let view = looking(altitude, [200.0, -60.0, 30.0], [height, 0.0]);
+        let shown = shoot(&mut sky, &view);
+        let to_sun = view.sun.to_light.as_dvec3().normalize().to_array();
+        // The sun stands as high over what is seen to a hundredth of a degree.
+        let place = LightPlace {
+            altitude: 0.0,
+            to_sun,
+            normal: [0.0, 1.0, 0.0],
+            sun_angular_radius: 0.0,
+        };
+        let light = query
+            .run(&gpu.device, &gpu.queue, sky.tables_mut(), &[place])
+            .unwrap()[0];
+        let picked: Vec<usize> = (0..PIXELS).step_by(211).collect();
+        let rays: Vec<ProbeRay> = picked
+            .iter()
+            .map(|&i| ProbeRay {
+                altitude,
+                dir: ray_of(&view, i).normalize().to_array(),
+                to_sun,
+                distance: f64::INFINITY,
+            })
+            .collect();
+        let quality = SkyQuality::finest();
+        let before = FastProbe::new(&gpu.device, veduta::programs(), &air, &quality, 0)
+            .and_then(|mut p| p.run(&gpu.device, &gpu.queue, &rays))
+            .unwrap();
+        let mut worst = 0.0_f32;
+        for (&i, before) in picked.iter().zip(&before) {
+            for c in 0..3 {
+                let lit = air.ground_albedo[c] as f32 * std::f32::consts::FRAC_1_PI;
+                let expected = before.in_scatter[c]
+                    + before.transmittance[c]
+                        * lit
+                        * (light.sun[c] * to_sun[1] as f32 + light.sky[c]);
+                let found = shown.pixels[i][c] / irradiance[c];
+                let off = relative(found, expected, 1e-6);
+                worst = worst.max(off);
+            }
+        }
+        println!("{altitude} m, sun at {height}: {:.2} %", 100.0 * worst);
+        assert!(worst < 0.03);
+    }
+}
+
+/// The penumbra of a large sun is the mean of those of its parts.
+#[test]
+fn a_wide_sun_lights_the_air_as_its_parts_do() {
+    let radius = 0.004_67_f64;
+    let mut sky = background(Preset::High);
+    let mut seen = |height: f64, azimuth: f64, radius: f64| {
+        let mut view = looking(2.0, [160.0, 25.0, 60.0], [height, azimuth]);
+        view.sun.angular_radius = radius as f32;
+        shoot(&mut sky, &view)
+    };
+    for height in [0.3, 0.0, -0.3, -1.0, -3.0] {
+        let wide = seen(height, 0.0, radius);
+        let mut parts = vec![[0.0_f32; 3]; PIXELS];
+        let mut count = 0.0;
+        for ring in 0..4 {
+            let r = radius.to_degrees() * ((f64::from(ring) + 0.5) / 4.0).sqrt();
+            for spoke in 0..8 {
+                let angle =
+                    std::f64::consts::TAU * (f64::from(spoke) + 0.5 * f64::from(ring % 2)) / 8.0;
+                let part = seen(height + r * angle.sin(), r * angle.cos(), 1e-4);
+                for (sum, p) in parts.iter_mut().zip(&part.pixels) {
+                    for c in 0..3 {
+                        sum[c] += p[c];
+                    }
+                }
+                count += 1.0;
+            }
+        }
+        let mut off: Vec<f32> = wide
+            .pixels
+            .iter()
+            .zip(&parts)
+            .flat_map(|(w, p)| (0..3).map(move |c| relative(w[c], p[c] / count, 1e-9)))
+            .collect();
+        off.sort_by(f32::total_cmp);
+        let at = |share: f32| off[(share * (off.len() - 1) as f32) as usize];
+        println!(
+            "sun at {height}: median {:.2} %, 99th centile {:.2} %",
+            100.0 * at(0.5),
+            100.0 * at(0.99)
+        );
+        assert!(at(0.5) < 0.015 && at(0.99) < 0.06);
+    }
+}
+
 #[test]
 fn light_at_a_place_is_that_of_sun_and_sky() {
     let gpu = gpu();

@@ -59,7 +59,7 @@ pub struct SkyArgs {
     /// Width and height of each picture in pixels
     #[arg(long, value_name = "WxH", default_value = "256x144")]
     pub size: Size,
-    /// Factor on radiance before the tone map; found from each picture when left out
+    /// Factor on radiance before the tone map; when left out that of the brightest picture is found, and darker ones follow it with the power 0.8 of how much darker they are
     #[arg(long)]
     pub exposure: Option<f64>,
     /// The picture, .png or .exr (radiance for a sun of irradiance 1, not exposed)
@@ -94,6 +94,16 @@ pub(crate) fn exposure_of(rgb: &[f32]) -> f64 {
     let bright = brightest[(brightest.len() - 1) * 8 / 10];
     // 1 - exp(-x) is about 0.52 in linear light, which is displayed at 0.75. Night stays night: what the last twilight leaves is not lit up.
     (0.74 / f64::from(bright.max(1e-20))).min(1e8)
+}
+
+/// Exposures of pictures that belong together: the brightest has its own, and a darker one follows with the power 0.8 of how much darker it is, so that noon, dusk and night
+/// keep their order and no exposure jumps from one frame of a day to the next.
+fn exposures_of(pictures: &[Vec<f32>]) -> Vec<f64> {
+    let own: Vec<f64> = pictures.iter().map(|rgb| exposure_of(rgb)).collect();
+    let least = own.iter().copied().fold(f64::INFINITY, f64::min);
+    own.iter()
+        .map(|own| least * (own / least).powf(0.8))
+        .collect()
 }
 
 /// Runs the command.
@@ -205,19 +215,22 @@ pub fn run(args: &SkyArgs) -> Result<(), CliError> {
         pictures.push(rgb);
     }
     let (w, h) = (width as usize, height as usize);
-    let shown = |rgb: Vec<f32>| {
-        let exposure = args.exposure.unwrap_or_else(|| exposure_of(&rgb));
+    let exposures = match args.exposure {
+        Some(exposure) => vec![exposure; pictures.len()],
+        None => exposures_of(&pictures),
+    };
+    let shown = |(rgb, exposure): (Vec<f32>, f64)| {
         Ok::<_, CliError>(Picture::new(w, h, rgb)?.display(exposure))
     };
     let name = args.out.to_string_lossy().into_owned();
     if args.day.is_some() && name.contains("%d") {
         let digits = (pictures.len() - 1).to_string().len();
-        for (k, rgb) in pictures.into_iter().enumerate() {
+        for (k, (rgb, exposure)) in pictures.into_iter().zip(exposures).enumerate() {
             let file = PathBuf::from(name.replace("%d", &format!("{k:0digits$}")));
             if exr {
                 write_exr(&file, width, height, &rgb)?;
             } else {
-                write_png(&file, width, height, &shown(rgb)?)?;
+                write_png(&file, width, height, &shown((rgb, exposure))?)?;
             }
         }
         return Ok(());
@@ -228,6 +241,7 @@ pub fn run(args: &SkyArgs) -> Result<(), CliError> {
     }
     let shown = pictures
         .into_iter()
+        .zip(exposures)
         .map(shown)
         .collect::<Result<Vec<Vec<u8>>, CliError>>()?;
     write_png(&args.out, width * count, height, &beside(&shown, w, h))
@@ -248,7 +262,16 @@ fn beside<T: Copy>(pictures: &[Vec<T>], width: usize, height: usize) -> Vec<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::sun_of_day;
+    use super::{exposures_of, sun_of_day};
+
+    #[test]
+    fn darker_pictures_stay_darker() {
+        let pictures = [[1.0_f32; 12], [0.1; 12], [0.1; 12]].map(|p| p.to_vec());
+        let found = exposures_of(&pictures);
+        assert_eq!(found[1], found[2]);
+        let shown = [found[0], 0.1 * found[1]];
+        assert!((shown[1] / shown[0] - 0.1_f64.powf(0.2)).abs() < 1e-6);
+    }
 
     #[test]
     fn the_sun_of_a_day_stands_where_spherical_triangles_say() {
