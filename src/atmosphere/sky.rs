@@ -39,7 +39,8 @@ pub struct SkyOptions {
     /// How the sky comes together with what the host has drawn.
     pub composition: SkyComposition,
     /// `None`: from the tables. Else the textbook path, for an eye within the air's lower tenth and behind things ([`SkyComposition::Background`]) alone: every pixel marches so many
-    /// steps along its ray, in [1, 512], and so many from each sample to the sun, in [1, 64], and has the light that is scattered once.
+    /// steps along its ray, in [1, 512], and so many from each sample to the sun, in [1, 64], and has the light that is scattered once. With 0 steps to the sun paths to
+    /// it are read from the table of columns, Afra's optical depth table, and light has all orders.
     pub march: Option<[u32; 2]>,
 }
 
@@ -211,6 +212,7 @@ impl PassMaker {
             (0, wgpu::BindingResource::Sampler(tables.sampler())),
             (1, view(tables.sky())),
             (4, view(tables.columns())),
+            (5, view(tables.diffuse())),
         ];
         second.extend(before.into_iter().filter_map(|(k, t)| Some((k, view(t?)))));
         second.retain(|(binding, _)| has(1, *binding));
@@ -264,13 +266,13 @@ impl Sky {
         if options.march.is_some() {
             let [steps, light_steps] = march.map(u64::from);
             let fits = (1..=512).contains(&steps)
-                && (1..=64).contains(&light_steps)
+                && (0..=64).contains(&light_steps)
                 && 4 * steps * (2 * light_steps + 3) < 65_520;
             if reads_depth || !fits {
                 return Err(fault(
                     "march",
                     format!("{march:?} with {:?}", options.composition),
-                    "Background with steps in [1, 512] and steps to the sun in [1, 64] of which 4 steps (2 light steps + 3) stays below 65,520",
+                    "Background with steps in [1, 512] and steps to the sun in [0, 64] of which 4 steps (2 light steps + 3) stays below 65,520",
                 ));
             }
         }

@@ -243,3 +243,10 @@ fn march_air_columns(columns: texture_2d_array<f32>, moments: texture_2d_array<f
 fn march_sky(air: Air, altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, steps: i32, light_steps: i32) -> vec3<f32> {
     return march_air(air, air_ray(air.ground_radius, air.top, altitude, dir, to_sun, 1e9), steps, light_steps).in_scatter;
 }
+
+/// As `march_sky`, but paths to the sun are read from the table of columns, Afra's optical depth table, and light of all orders is added.
+///
+/// internal
+fn march_sky_columns(columns: texture_2d_array<f32>, moments: texture_2d_array<f32>, linear: sampler, air: Air, altitude: f32, dir: vec3<f32>, to_sun: vec3<f32>, steps: i32) -> vec3<f32> {
+    return march_air_columns(columns, moments, linear, air, air_ray(air.ground_radius, air.top, altitude, dir, to_sun, 1e9), true, steps).in_scatter;
+}

@@ -86,7 +86,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::atmosphere::sky_view::{sky_seen_by_pair}
 #endif
 #ifdef SKY_MARCH
-#import veduta::atmosphere::textbook::{march_sky}
+#import veduta::atmosphere::textbook::{march_sky, march_sky_columns}
 #endif
 #ifdef AERIAL
 #import veduta::atmosphere::ray::{AirLight, air_ray}
@@ -114,6 +114,9 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 @group(1) @binding(2) var light: texture_2d_array<f32>;
 @group(1) @binding(3) var depths: texture_2d<f32>;
 @group(1) @binding(4) var columns: texture_2d_array<f32>;
+#ifdef SKY_MARCH
+@group(1) @binding(5) var moments: texture_2d_array<f32>;
+#endif
 #ifdef AERIAL
 #ifdef AERIAL_TARGETS
 @group(2) @binding(0) var depth: texture_depth_2d;
@@ -145,6 +148,9 @@ fn place_of(dir: vec3<f32>) -> SkyPlace {
 // Behind the host's things: the sky, or the bare ground and the air before it.
 fn background(ray: vec3<f32>) -> vec3<f32> {
 #ifdef SKY_MARCH
+    if MARCH_LIGHT_STEPS == 0 {
+        return march_sky_columns(columns, moments, linear, air, eye.altitude, normalize(ray), eye.to_sun, MARCH_STEPS);
+    }
     return march_sky(air, eye.altitude, normalize(ray), eye.to_sun, MARCH_STEPS, MARCH_LIGHT_STEPS);
 #else
     if EYE_PLACE != 0 {
