@@ -15,6 +15,86 @@ const SIZE: usize = 1024;
 /// Steps of one measurement.
 const STEPS: u32 = 6;
 
+/// What a step of the source's scheme cannot do without: each field read once (water, what rounding took from it, mean, ground, four speeds) and each that changes written once, by
+/// the same threads in the same order, and nothing computed.
+const COPY: &str = "
+@group(0) @binding(0) var<storage, read> source: array<vec4<f32>>;
+@group(0) @binding(1) var<storage, read_write> into: array<vec4<f32>>;
+@compute @workgroup_size(8)
+fn copy(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id: vec3<u32>) {
+    let plane = arrayLength(&source) / 8u;
+    for (var row = 0u; row < 32u; row++) {
+        let at = id.x * 256u + row * 8u + lane;
+        into[at] = source[at] + source[at + 7u * plane];
+        into[at + plane] = source[at + plane];
+        into[at + 2u * plane] = source[at + 2u * plane];
+        into[at + 3u * plane] = source[at + 3u * plane];
+        into[at + 4u * plane] = source[at + 4u * plane];
+        into[at + 5u * plane] = source[at + 5u * plane];
+        into[at + 6u * plane] = source[at + 6u * plane];
+    }
+}
+";
+
+/// Single floats that [`COPY`] reads and writes a cell.
+const COPIED: f64 = 15.0;
+
+/// Single floats that a step reads and writes a cell, counted from the programs: the source's scheme without and with erosion, the physical one.
+const TOUCHED: [f64; 3] = [25.5, 43.0, 22.5];
+
+struct Copy {
+    pipeline: wgpu::ComputePipeline,
+    group: wgpu::BindGroup,
+}
+
+impl Copy {
+    fn new(device: &wgpu::Device) -> Copy {
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("copy"),
+            source: wgpu::ShaderSource::Wgsl(COPY.into()),
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("copy"),
+            layout: None,
+            module: &module,
+            entry_point: None,
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        let planes = || {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("planes"),
+                size: (8 * SIZE * SIZE * 4) as u64,
+                usage: wgpu::BufferUsages::STORAGE,
+                mapped_at_creation: false,
+            })
+        };
+        let buffers = [planes(), planes()];
+        let entries: Vec<wgpu::BindGroupEntry> = (0..)
+            .zip(&buffers)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("copy"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        Copy { pipeline, group }
+    }
+
+    fn record(&self, encoder: &mut wgpu::CommandEncoder) {
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.group, &[]);
+        for _ in 0..STEPS {
+            pass.dispatch_workgroups((SIZE * SIZE / 1024) as u32, 1, 1);
+        }
+    }
+}
+
 /// The worlds: a name, options, and the share of the columns that hold moving water.
 fn worlds() -> Vec<(&'static str, GroundOptions, f64)> {
     let source = GroundOptions {
@@ -68,6 +148,8 @@ fn state(share: f64) -> Result<GroundState, CliError> {
 pub struct Report {
     /// By world: name, seconds of each round, share of tiles that ran, bytes a cell.
     pub worlds: Vec<(&'static str, Vec<f64>, f64, f64)>,
+    /// Processor seconds of each round for what a step reads and writes at least.
+    pub copy: Vec<f64>,
 }
 
 /// Measures all worlds in turn, `rounds` times.
@@ -81,19 +163,20 @@ pub fn run(
 ) -> Result<Report, CliError> {
     let gpu = &bench.gpu;
     let mut grounds = Vec::new();
-    let run = |ground: &mut Ground, steps: u32| -> Result<f64, CliError> {
-        let before = CpuTime::now();
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let _ = ground.step(&mut encoder, steps);
-        gpu.queue.submit([encoder.finish()]);
-        gpu.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| veduta::Error::Device(e.to_string()))?;
-        Ok(match (before, CpuTime::now()) {
-            (Some(before), Some(after)) => after.since(&before) / 1e3 / f64::from(steps),
-            _ => f64::NAN,
-        })
-    };
+    let time =
+        |steps: u32, record: &mut dyn FnMut(&mut wgpu::CommandEncoder)| -> Result<f64, CliError> {
+            let before = CpuTime::now();
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            record(&mut encoder);
+            gpu.queue.submit([encoder.finish()]);
+            gpu.device
+                .poll(wgpu::PollType::wait_indefinitely())
+                .map_err(|e| veduta::Error::Device(e.to_string()))?;
+            Ok(match (before, CpuTime::now()) {
+                (Some(before), Some(after)) => after.since(&before) / 1e3 / f64::from(steps),
+                _ => f64::NAN,
+            })
+        };
     for (name, options, share) in worlds() {
         let mut ground = Ground::new(
             &gpu.device,
@@ -103,14 +186,22 @@ pub fn run(
             &state(share)?,
         )?;
         // The first steps compile, and dry tiles fall asleep.
-        run(&mut ground, 3)?;
+        time(3, &mut |encoder| {
+            let _ = ground.step(encoder, 3);
+        })?;
         grounds.push((name, ground, Vec::new()));
     }
+    let copy = Copy::new(&gpu.device);
+    time(STEPS, &mut |encoder| copy.record(encoder))?;
+    let mut copied = Vec::new();
     for _ in 0..rounds {
         for (name, ground, times) in &mut grounds {
             progress(name);
-            times.push(run(ground, STEPS)?);
+            times.push(time(STEPS, &mut |encoder| {
+                let _ = ground.step(encoder, STEPS);
+            })?);
         }
+        copied.push(time(STEPS, &mut |encoder| copy.record(encoder))?);
     }
     let mut found = Vec::new();
     for (name, ground, times) in grounds {
@@ -123,7 +214,10 @@ pub fn run(
             ground.bytes() as f64 / (SIZE * SIZE) as f64,
         ));
     }
-    Ok(Report { worlds: found })
+    Ok(Report {
+        worlds: found,
+        copy: copied,
+    })
 }
 
 /// The table.
@@ -150,11 +244,42 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
             format!("{bytes:.0}"),
         ]);
     }
+    let cells = (SIZE * SIZE) as f64;
+    let copy = Middle::of(&report.copy).median / cells * 1e9;
+    rows.push(vec![
+        "copy of 8 planes into 7".to_owned(),
+        format!("{copy:.2}"),
+        format!("{:.1}", 1e3 / copy),
+        "100 %".to_owned(),
+        "64".to_owned(),
+    ]);
+    let bounds: Vec<Vec<String>> = ["source", "source with erosion", "physical"]
+        .iter()
+        .zip(TOUCHED)
+        .map(|(name, touched)| {
+            let least = touched * copy / COPIED;
+            vec![
+                (*name).to_owned(),
+                format!("{touched:.1}"),
+                format!("{least:.1}"),
+                format!("{:.0}", 1e3 / least),
+            ]
+        })
+        .collect();
+    let heads = [
+        "scheme",
+        "floats read and written a cell",
+        "ns at the copy's pace",
+        "million cell steps a second at most",
+    ];
+    let bounds = [vec![heads.map(str::to_owned).to_vec()], bounds].concat();
     format!(
-        "# What a step of the living ground costs\n\nWritten by `{command}`.\n\n{}\nProcessor time of the process at {SIZE} x {SIZE} cells, medians of {} rounds of {STEPS} steps, the worlds in turn.\n\n{}",
+        "# What a step of the living ground costs\n\nWritten by `{command}`.\n\n{}\nProcessor time of the process at {SIZE} x {SIZE} cells, medians of {} rounds of {STEPS} steps, the worlds in turn.\n\n{}\n\
+         The copy reads every field of the source's scheme once, writes every field that changes once, and computes nothing. What the schemes read and write at its pace:\n\n{}",
         bench.machine(),
         report.worlds.first().map_or(0, |w| w.1.len()),
         table(&rows),
+        table(&bounds),
     )
 }
 
@@ -174,5 +299,6 @@ pub fn to_json(bench: &Bench, report: &Report, command: &str) -> serde_json::Val
             })
         })
         .collect();
+    document["copy_seconds"] = report.copy.clone().into();
     document
 }
