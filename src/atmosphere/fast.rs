@@ -7,6 +7,7 @@ use crate::program::ProgramSet;
 
 use super::Atmosphere;
 use super::probe::{ProbeLight, ProbeRay, checked};
+use super::ray::AirRay;
 use super::tables::{Eye, SkyQuality, SkyTables, bind_groups, compute};
 use crate::exchange::{Exchange, three};
 
@@ -73,7 +74,13 @@ impl FastProbe {
             .map(|(at, ray)| checked(ray, at))
             .collect::<Result<Vec<ProbeRay>, Error>>()?;
         let mut groups: BTreeMap<(u64, u64), Vec<usize>> = BTreeMap::new();
+        let air = self.tables.atmosphere();
+        let (radius, top) = (air.planet_radius, air.thickness);
         for (i, ray) in rays.iter().enumerate() {
+            // What misses the air, or has no length, is found in f64: a device's floats know the limb to metres.
+            if AirRay::new(radius, top, ray).length == 0.0 {
+                continue;
+            }
             let key = (ray.altitude.to_bits(), ray.to_sun[1].to_bits());
             groups.entry(key).or_default().push(i);
         }

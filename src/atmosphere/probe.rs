@@ -56,7 +56,7 @@ impl ProbeRay {
     ///
     /// # Errors
     /// [`Error::OutOfDomain`] naming the row, which `row` is the number of, for an altitude below 0 or not finite, a
-    /// direction whose length is not within 1e-3 of 1, and a distance that is not above 0.
+    /// direction whose length is not within 1e-3 of 1, and a distance below 0.
     pub fn from_row(row: usize, numbers: [f64; 8]) -> Result<ProbeRay, Error> {
         let [altitude, dx, dy, dz, sx, sy, sz, distance] = numbers;
         let name = |what: &str| format!("{what} of row {row}");
@@ -70,8 +70,8 @@ impl ProbeRay {
             within(&what, length, (0.999, 1.001, "1"))?;
             Ok(v.map(|x| x / length))
         };
-        if distance.is_nan() || distance <= 0.0 {
-            let domain = "above 0 m, or infinite".to_owned();
+        if distance.is_nan() || distance < 0.0 {
+            let domain = "at least 0 m, or infinite".to_owned();
             return Err(fault(&name("the distance"), distance, domain));
         }
         Ok(ProbeRay {

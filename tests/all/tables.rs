@@ -702,12 +702,7 @@ fn no_eye_is_too_low_or_too_high_for_the_tables() {
                 && found.transmittance.iter().all(|v| (0.0..=1.0).contains(v));
             assert!(fine, "{ray:?}: {found:?}");
             let made = AirRay::new(air.planet_radius, top, ray);
-            let tangent = (air.planet_radius + ray.altitude) * ray.dir[0].hypot(ray.dir[2])
-                - air.planet_radius;
-            if ray.altitude > top
-                && (made.length == 0.0 && (tangent - top).abs() > 10.0
-                    || ray.distance < ray.altitude - top)
-            {
+            if ray.altitude > top && (made.length == 0.0 || ray.distance < ray.altitude - top) {
                 assert_eq!(
                     (found.in_scatter, found.transmittance),
                     ([0.0; 3], [1.0; 3]),
@@ -719,6 +714,43 @@ fn no_eye_is_too_low_or_too_high_for_the_tables() {
 }
 
 /// Layers that are no thicker than a step of the sky's rays, and scatter: from below, from within and from above.
+#[test]
+fn rays_past_the_limb_miss_exactly() {
+    let air = named("earth");
+    let top = air.thickness;
+    let rays: Vec<ProbeRay> = [4e5, 3.6e7, 1e9]
+        .iter()
+        .flat_map(|&altitude: &f64| {
+            [-3.0, -0.5, 0.0, 0.5, 3.0, 50.0].map(|above: f64| {
+                let sine = (air.planet_radius + top + above) / (air.planet_radius + altitude);
+                ProbeRay {
+                    altitude,
+                    dir: [sine, -((1.0 - sine) * (1.0 + sine)).sqrt(), 0.0],
+                    to_sun: heading(0.3, 0.0),
+                    distance: FAR,
+                }
+            })
+        })
+        .collect();
+    for march in [0, 32] {
+        let quality = quality(Preset::Low);
+        let found = FastProbe::new(&gpu().device, veduta::programs(), &air, &quality, march)
+            .and_then(|mut p| p.run(&gpu().device, &gpu().queue, &rays))
+            .unwrap();
+        for (k, found) in found.iter().enumerate() {
+            if k % 6 >= 3 {
+                assert_eq!(
+                    (found.in_scatter, found.transmittance),
+                    ([0.0; 3], [1.0; 3])
+                );
+            } else {
+                // Metres below the top there is next to nothing.
+                assert!(found.in_scatter.iter().all(|v| (0.0..1e-6).contains(v)));
+            }
+        }
+    }
+}
+
 #[test]
 fn thin_layers_that_scatter_are_not_missed() {
     let profiles = [
