@@ -907,6 +907,23 @@ fn what_the_view_does_not_show_is_not_drawn() {
 }
 
 #[test]
+fn tables_take_at_most_four_mebibytes() {
+    let targets = targets(Depth::default(), Projection::default());
+    for (preset, most) in [
+        (Preset::High, 4.0),
+        (Preset::Medium, 2.0),
+        (Preset::Low, 1.0),
+    ] {
+        for composition in [SkyComposition::Background, SkyComposition::OverPicture] {
+            let sky = sky_with(&targets, composition, preset.clone());
+            let mib = sky.resources().texture_bytes as f64 / f64::from(1 << 20);
+            println!("{preset:?} {composition:?}: {mib:.2} MiB");
+            assert!(mib > 0.0 && mib <= most);
+        }
+    }
+}
+
+#[test]
 fn a_flight_from_the_ground_to_geostationary_orbit_has_no_pop() {
     let mut sky = background(Preset::Medium);
     let radius = Atmosphere::default().planet_radius;

@@ -95,13 +95,14 @@ pub fn wgsl() -> String {
         };
         let _ = writeln!(
             text,
-            "    if which % {COUNT}u == {i}u {{ return {TYPE}({}, {}, {}u, {}, {}, {}, {}, {}, {}); }}",
+            "    if which % {COUNT}u == {i}u {{ return {TYPE}({}, {}, {}u, {}, {}, {}, {}, {}, {}, {}); }}",
             number(0),
             number(1),
             words[2],
             number(3),
             number(4),
             number(5),
+            number(6),
             vector(8, 3),
             lanes(12),
             lanes(80)
