@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::camera::GroundCamera;
 use super::options::{Erosion, GroundOptions};
+use super::picture::GroundLook;
 use super::state::{CHANNELS, GroundState};
 use crate::device::Gpu;
 use crate::error::Error;
@@ -75,6 +77,10 @@ pub struct GroundScene {
     pub depth: f64,
     /// What it obeys.
     pub options: GroundOptions,
+    /// Where it is seen from; `None`: from the south and above.
+    pub camera: Option<GroundCamera>,
+    /// How its picture is coloured.
+    pub look: GroundLook,
 }
 
 impl Default for GroundScene {
@@ -92,6 +98,8 @@ impl Default for GroundScene {
             water_share: 1.0,
             depth: 0.0,
             options: GroundOptions::default(),
+            camera: None,
+            look: GroundLook::default(),
         }
     }
 }
@@ -330,6 +338,10 @@ impl GroundScene {
         if let Some(field) = &self.field {
             field.check()?;
         }
+        if let Some(camera) = &self.camera {
+            camera.check()?;
+        }
+        self.look.check()?;
         self.options.check()
     }
 

@@ -16,6 +16,7 @@ mod fractal;
 mod getting_started;
 mod globe;
 mod ground;
+mod ground_picture;
 mod hash;
 mod land;
 mod landscape;

@@ -4,12 +4,23 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use veduta::ground::{CHANNELS, Ground, GroundReport, GroundScene, GroundState};
+use veduta::WorldPos;
+use veduta::ground::{
+    CHANNELS, Ground, GroundCamera, GroundPicture, GroundPictureOptions, GroundReport, GroundScene,
+    GroundState, Triangulation,
+};
+use veduta::terrain::TerrainLights;
 
 use crate::cpu::CpuTime;
 use crate::error::CliError;
 use crate::image::{check_folder, check_output, numbered, write_png};
+use crate::metrics::Picture;
+use crate::render::Size;
 use crate::table::{read_cube, write_cube};
+use crate::under_sky::UnderSky;
+
+use super::probe::atmosphere;
+use super::sky::exposure_of;
 
 /// Arguments of `veduta simulate`.
 #[derive(Debug, Clone, clap::Args)]
@@ -35,12 +46,152 @@ pub struct SimulateArgs {
     /// Pictures' path; beside --out or in this folder when left out
     #[arg(long, value_name = "PICTURE.png")]
     pub pictures: Option<PathBuf>,
+    /// Draw the ground from above, a pixel a cell, instead of under the sky
+    #[arg(long)]
+    pub map: bool,
+    /// Width and height of the pictures in pixels
+    #[arg(long, value_name = "WxH", default_value = "512x288")]
+    pub size: Size,
+    /// Place of the eye in metres from the first cell, y up; the scene's camera when left out
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_delimiter = ',',
+        num_args = 3,
+        allow_negative_numbers = true
+    )]
+    pub eye: Option<Vec<f64>>,
+    /// Place that the eye looks at
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_delimiter = ',',
+        num_args = 3,
+        allow_negative_numbers = true
+    )]
+    pub target: Option<Vec<f64>>,
+    /// Vertical field of view in degrees, 0.01 to 170
+    #[arg(long)]
+    pub fov: Option<f64>,
+    /// Height of the sun above the horizon in degrees
+    #[arg(long, allow_negative_numbers = true)]
+    pub sun_height: Option<f64>,
+    /// Azimuth of the sun in degrees, clockwise from -z
+    #[arg(long, allow_negative_numbers = true)]
+    pub sun_azimuth: Option<f64>,
+    /// A shipped atmosphere or a .ron file
+    #[arg(long, value_name = "NAME|FILE", default_value = "earth")]
+    pub atmosphere: String,
+    /// Factor on radiance before the tone map; found from the first picture when left out
+    #[arg(long)]
+    pub exposure: Option<f64>,
+    /// How squares become triangles
+    #[arg(long, value_enum, default_value = "random")]
+    pub triangles: Triangles,
     /// Where sums, times and extremes go
     #[arg(long, value_name = "STATS.json")]
     pub stats: Option<PathBuf>,
     /// Show no progress
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// How squares of the ground become triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Triangles {
+    /// Two, along the same diagonal everywhere
+    Fixed,
+    /// Four around a middle
+    FourWay,
+    /// Two, along a diagonal by chance
+    Random,
+}
+
+/// The ground under its sky, from one place.
+struct Painter {
+    under: UnderSky,
+    picture: GroundPicture,
+    view: veduta::View,
+    lights: TerrainLights,
+    exposure: Option<f64>,
+}
+
+impl Painter {
+    fn new(args: &SimulateArgs, scene: &GroundScene, ground: &Ground) -> Result<Painter, CliError> {
+        let three = |v: &Option<Vec<f64>>| v.as_ref().map(|v| [v[0], v[1], v[2]]);
+        let spacing = f64::from(scene.options.spacing);
+        let mut camera = scene
+            .camera
+            .unwrap_or_else(|| GroundCamera::over(ground.size(), spacing, ground.range()));
+        camera.eye = three(&args.eye).unwrap_or(camera.eye);
+        camera.target = three(&args.target).unwrap_or(camera.target);
+        camera.field_of_view = args.fov.unwrap_or(camera.field_of_view);
+        camera.sun_height = args.sun_height.unwrap_or(camera.sun_height);
+        camera.sun_azimuth = args.sun_azimuth.unwrap_or(camera.sun_azimuth);
+        if let Some(exposure) = args.exposure
+            && !(0.0..=1e12).contains(&exposure)
+        {
+            return Err(CliError::argument(
+                "--exposure",
+                exposure.to_string(),
+                "in [0, 1e12]",
+            ));
+        }
+        let air = atmosphere(&args.atmosphere)?;
+        let aspect = f64::from(args.size.width) / f64::from(args.size.height);
+        let mut view = camera.view(WorldPos::default(), aspect)?;
+        view.sun.angular_radius = air.sun.angular_radius as f32;
+        let mut under = UnderSky::new(air, args.size)?;
+        let lights = under.lights(&view, f64::from(ground.range()[0]))?;
+        let options = GroundPictureOptions {
+            triangulation: match args.triangles {
+                Triangles::Fixed => Triangulation::Fixed,
+                Triangles::FourWay => Triangulation::FourWay,
+                Triangles::Random => Triangulation::Random,
+            },
+            look: scene.look,
+            ..Default::default()
+        };
+        let gpu = veduta::device::shared()?;
+        let programs = veduta::programs();
+        let targets = UnderSky::targets();
+        let picture = GroundPicture::new(&gpu.device, programs, &targets, ground, &options)?;
+        Ok(Painter {
+            under,
+            picture,
+            view,
+            lights,
+            exposure: args.exposure,
+        })
+    }
+
+    fn paint(&mut self, ground: &Ground, path: &Path) -> Result<(), CliError> {
+        let queue = &veduta::device::shared()?.queue;
+        let Painter {
+            under,
+            picture,
+            view,
+            lights,
+            exposure,
+        } = self;
+        let cell = std::cell::RefCell::new(picture);
+        let rgb = under.paint(
+            view,
+            |encoder| {
+                let _ = cell
+                    .borrow_mut()
+                    .prepare(queue, encoder, ground, view, lights)?;
+                Ok(())
+            },
+            |pass| {
+                let _ = cell.borrow().draw_opaque(pass);
+            },
+        )?;
+        let exposure = *exposure.get_or_insert_with(|| exposure_of(&rgb));
+        let Size { width, height } = under.size();
+        let shown = Picture::new(width as usize, height as usize, rgb)?.display(exposure);
+        write_png(path, width, height, &shown)
+    }
 }
 
 /// A ground as its file says, or one that ships.
@@ -113,18 +264,23 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         ProgressStyle::with_template("{bar:40} {pos}/{len} steps, {eta} left")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
-    let picture = |state: &GroundState, step: u64| -> Result<(), CliError> {
+    let mut painter = if args.frames > 0 && !args.map {
+        Some(Painter::new(args, &scene, &ground)?)
+    } else {
+        None
+    };
+    let mut picture = |ground: &Ground, step: u64| -> Result<(), CliError> {
         let number = u32::try_from(step / args.frames.max(1)).unwrap_or(u32::MAX);
-        let rgb = relief(state, scene.options.spacing);
-        write_png(
-            &numbered(&pictures, number),
-            state.columns as u32,
-            state.rows as u32,
-            &rgb,
-        )
+        let path = numbered(&pictures, number);
+        if let Some(painter) = &mut painter {
+            return painter.paint(ground, &path);
+        }
+        let state = ground.state(gpu)?;
+        let rgb = relief(&state, scene.options.spacing);
+        write_png(&path, state.columns as u32, state.rows as u32, &rgb)
     };
     if args.frames > 0 {
-        picture(&begin, 0)?;
+        picture(&ground, 0)?;
     }
     let (started, mut cpu) = (Instant::now(), 0.0);
     let mut chunk = 4_u64;
@@ -154,7 +310,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         done += now;
         bar.set_position(done);
         if args.frames > 0 && done.is_multiple_of(args.frames) {
-            picture(&ground.state(gpu)?, done)?;
+            picture(&ground, done)?;
         }
     }
     bar.finish_and_clear();
