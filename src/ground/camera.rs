@@ -34,7 +34,7 @@ fn thirty() -> f64 {
 }
 
 fn west() -> f64 {
-    -70.0
+    -120.0
 }
 
 impl GroundCamera {

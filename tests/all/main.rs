@@ -17,6 +17,7 @@ mod getting_started;
 mod globe;
 mod ground;
 mod ground_picture;
+mod ground_rows;
 mod hash;
 mod land;
 mod landscape;

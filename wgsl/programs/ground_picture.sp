@@ -136,9 +136,9 @@ fn albedo_of(normal: vec3<f32>, altitude: f32, mean: f32, under: f32) -> vec3<f3
     let slope = length(normal.xz) / max(normal.y, 1e-3);
     let steep = smoothstep(draw_view.steep_from, draw_view.steep_to, slope);
     let bare = mix(gentle, draw_view.steep_albedo, steep);
-    let wet = max(smoothstep(0.0, draw_view.mud_depth, mean), under);
+    let wet = smoothstep(0.0, draw_view.mud_depth, mean);
     // Mud on gentle ground; rock only darkens.
-    return mix(bare, mix(draw_view.mud_albedo, 0.6 * bare, steep), wet);
+    return mix(bare, mix(draw_view.mud_albedo, 0.6 * bare, steep), wet) * (1.0 - 0.3 * under);
 }
 
 @fragment
@@ -146,7 +146,7 @@ fn draw(in: GroundCorner) -> @location(0) vec4<f32> {
     let water = in.depths.x;
     let normal = normalize(in.normal);
     let lights = ThreeLights(draw_view.sun_light, draw_view.sky_light, draw_view.bounce_light);
-    // Ground under water is wet.
+    // Ground under water is darker.
     let under = smoothstep(0.0, 0.05, water);
     let bed = INVERSE_PI * albedo_of(normal, in.depths.z, in.depths.y, under) * shade_three_lights(lights, normal, draw_view.to_sun, 1.0);
     if GROUND_LAYER == 0 {

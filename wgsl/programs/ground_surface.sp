@@ -4,7 +4,7 @@ What the picture of the ground shows of every cell: height, level of the water a
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep}
+#import veduta::ground::grid::{GroundStep, row_start, cell_start}
 #import veduta::ground::surface::{displayed_level}
 
 struct Shore {
@@ -21,9 +21,14 @@ struct Shore {
 // Height and displayed level over the reference level, depth, mean.
 @group(2) @binding(0) var surface: texture_storage_2d<rgba32float, write>;
 
-// Level and depth of a cell; beyond the edges those of the edge.
+// Where a cell is; beyond the edges those of the edge.
+fn index_of(x: i32, z: i32) -> i32 {
+    return 4 * row_start(now, clamp(z, 0, now.rows - 1)) + cell_start(clamp(x, 0, now.columns - 1));
+}
+
+// Level and depth of a cell.
 fn cell(x: i32, z: i32) -> vec2<f32> {
-    let at = clamp(z, 0, now.rows - 1) * 4 * now.groups + clamp(x, 0, now.columns - 1);
+    let at = index_of(x, z);
     let depth = water[at >> 2u][at & 3];
     return vec2<f32>(ground[at >> 2u][at & 3] + depth, depth);
 }
@@ -35,7 +40,7 @@ fn show(@builtin(global_invocation_id) id: vec3<u32>) {
     if x >= now.columns || z >= now.rows {
         return;
     }
-    let at = z * 4 * now.groups + x;
+    let at = index_of(x, z);
     let height = ground[at >> 2u][at & 3];
     let depth = water[at >> 2u][at & 3];
     let left = cell(x - 1, z);

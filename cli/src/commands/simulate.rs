@@ -9,7 +9,7 @@ use veduta::ground::{
     CHANNELS, Ground, GroundCamera, GroundPicture, GroundPictureOptions, GroundReport, GroundScene,
     GroundState, Triangulation,
 };
-use veduta::terrain::TerrainLights;
+use veduta::terrain::{HeightMap, TerrainLights};
 
 use crate::cpu::CpuTime;
 use crate::error::CliError;
@@ -37,6 +37,15 @@ pub struct SimulateArgs {
     /// The state to begin with, .npy: float32, rows, columns, 8 to 14 channels; the scene's own when left out
     #[arg(long = "in", value_name = "STATE.npy")]
     pub input: Option<PathBuf>,
+    /// Heights, a cell a texel, in the place of the scene's: .png (grey, 8 or 16 bits), .exr or .npy
+    #[arg(long, value_name = "FILE")]
+    pub heights: Option<PathBuf>,
+    /// Height of a value of 0 in --heights in metres
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub lowest: f64,
+    /// Height of a value of 1 in --heights in metres: the greatest of a .png; 1 for files that hold metres
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
+    pub highest: f64,
     /// Where the last state goes, .npy with 14 channels
     #[arg(long, value_name = "STATE.npy")]
     pub out: Option<PathBuf>,
@@ -200,8 +209,7 @@ fn scene(name: &str) -> Result<GroundScene, CliError> {
     if path.extension().is_none_or(|e| e != "ron") {
         return Ok(GroundScene::named(name)?);
     }
-    let text = std::fs::read_to_string(path).map_err(|e| CliError::read(path, e))?;
-    GroundScene::from_ron(&text).map_err(|e| CliError::Table {
+    GroundScene::read(path).map_err(|e| CliError::Table {
         path: path.to_owned(),
         what: e.to_string(),
     })
@@ -227,6 +235,16 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         check_folder(&pictures)?;
     }
     let mut scene = scene(&args.scene)?;
+    if let Some(file) = &args.heights {
+        let mut map = HeightMap {
+            file: file.display().to_string(),
+            lowest: args.lowest,
+            highest: args.highest,
+            ..Default::default()
+        };
+        map.read(Path::new(""))?;
+        scene.take_heights(map)?;
+    }
     for pair in &args.set {
         let Some((key, value)) = pair.split_once('=') else {
             return Err(CliError::argument("--set", pair, "KEY=VALUE"));
