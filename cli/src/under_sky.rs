@@ -70,6 +70,7 @@ impl UnderSky {
             preset: Preset::High,
             atmosphere: air,
             composition: SkyComposition::OverPicture,
+            ..Default::default()
         };
         let mut sky = Sky::new(&gpu.device, veduta::programs(), &over, &options)?;
         sky.set_host(&gpu.device, &views[1], Some(&views[0]))?;

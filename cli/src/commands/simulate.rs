@@ -62,23 +62,11 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "WxH", default_value = "512x288")]
     pub size: Size,
     /// Place of the eye in metres from the first cell, y up; the scene's camera when left out
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_delimiter = ',',
-        num_args = 3,
-        allow_negative_numbers = true
-    )]
-    pub eye: Option<Vec<f64>>,
+    #[arg(long, value_name = "X,Y,Z", value_parser = three, allow_hyphen_values = true)]
+    pub eye: Option<[f64; 3]>,
     /// Place that the eye looks at
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_delimiter = ',',
-        num_args = 3,
-        allow_negative_numbers = true
-    )]
-    pub target: Option<Vec<f64>>,
+    #[arg(long, value_name = "X,Y,Z", value_parser = three, allow_hyphen_values = true)]
+    pub target: Option<[f64; 3]>,
     /// Vertical field of view in degrees, 0.01 to 170
     #[arg(long)]
     pub fov: Option<f64>,
@@ -116,6 +104,17 @@ pub enum Triangles {
     Random,
 }
 
+/// Three numbers between commas.
+fn three(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map(|part| part.trim().parse::<f64>().map_err(|e| e.to_string()))
+        .collect::<Result<_, _>>()?;
+    numbers
+        .try_into()
+        .map_err(|v: Vec<f64>| format!("{} numbers, but three must be", v.len()))
+}
+
 /// The ground under its sky, from one place.
 struct Painter {
     under: UnderSky,
@@ -127,13 +126,12 @@ struct Painter {
 
 impl Painter {
     fn new(args: &SimulateArgs, scene: &GroundScene, ground: &Ground) -> Result<Painter, CliError> {
-        let three = |v: &Option<Vec<f64>>| v.as_ref().map(|v| [v[0], v[1], v[2]]);
         let spacing = f64::from(scene.options.spacing);
         let mut camera = scene
             .camera
             .unwrap_or_else(|| GroundCamera::over(ground.size(), spacing, ground.range()));
-        camera.eye = three(&args.eye).unwrap_or(camera.eye);
-        camera.target = three(&args.target).unwrap_or(camera.target);
+        camera.eye = args.eye.unwrap_or(camera.eye);
+        camera.target = args.target.unwrap_or(camera.target);
         camera.field_of_view = args.fov.unwrap_or(camera.field_of_view);
         camera.sun_height = args.sun_height.unwrap_or(camera.sun_height);
         camera.sun_azimuth = args.sun_azimuth.unwrap_or(camera.sun_azimuth);
