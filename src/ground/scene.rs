@@ -222,7 +222,7 @@ impl GroundScene {
         Ok(scene)
     }
 
-    /// Sets a key, which is a field's name in upper case; RAIN, EVAPORATION and SEEPAGE in mm/h; SPRING adds one by `x,z,radius,rate`; EROSION is `on` or `off`.
+    /// Sets a key, which is a field's name in upper case; RAIN, EVAPORATION and SEEPAGE in mm/h; SPRING adds one by `x,z,radius,rate`, `none` takes all away; EROSION is `on` or `off`.
     ///
     /// # Errors
     /// [`Error::UnknownKey`], [`Error::WrongType`].
@@ -281,6 +281,7 @@ impl GroundScene {
             "FRICTION" => o.friction = single()?,
             "LONGEST_STEP" => o.longest_step = single()?,
             "EROSION" => o.erosion = yes()?.then(|| o.erosion.unwrap_or_default()),
+            "SPRING" if value.trim() == "none" => o.springs.clear(),
             "SPRING" => {
                 let numbers = value
                     .split(',')

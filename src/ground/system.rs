@@ -547,6 +547,7 @@ impl Ground {
             });
         }
         self.options = options.clone();
+        self.changes += 1;
         self.upload(queue);
         self.wake(queue);
         Ok(())

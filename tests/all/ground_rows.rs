@@ -433,3 +433,25 @@ fn ground_heights_come_from_files() {
     let fault = GroundScene::read(&folder.join("nothing.ron")).unwrap_err();
     assert!(fault.to_string().contains("nothing.ron"), "{fault}");
 }
+
+/// Springs of a scene: set by key, taken away, and faults named.
+#[test]
+fn ground_springs_come_and_go() {
+    let mut scene = GroundScene::named("flood").unwrap();
+    assert_eq!(scene.options.springs.len(), 1);
+    scene.set("SPRING", "none").unwrap();
+    assert!(scene.options.springs.is_empty());
+    scene.set("SPRING", "1, 2, 3, 40").unwrap();
+    let spring = scene.options.springs[0];
+    assert_eq!(
+        [spring.x, spring.z, spring.radius, spring.rate],
+        [1.0, 2.0, 3.0, 40.0]
+    );
+    let fault = scene.set("SPRING", "1,2,3").unwrap_err().to_string();
+    assert!(fault.contains("x,z,radius,rate"), "{fault}");
+    // All that ship can be seen.
+    for name in GroundScene::names() {
+        let scene = GroundScene::named(name).unwrap();
+        scene.camera.unwrap().check().unwrap();
+    }
+}
