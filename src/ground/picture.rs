@@ -290,7 +290,6 @@ impl GroundPicture {
         let block = ShoreBlock {
             least: options.look.least_depth,
             sink: options.look.sink,
-            ..ShoreBlock::ZERO
         };
         let uniform = wgpu::BufferUsages::UNIFORM;
         let shore = filled("veduta shore", &block.to_bytes(), uniform)?;
@@ -423,7 +422,6 @@ impl GroundPicture {
             mud_depth: o.mud_depth,
             water_albedo: o.water_albedo,
             blocks_x: (self.size[0] - 1).div_ceil(BLOCK) as i32,
-            ..ViewBlock::ZERO
         };
         let mut work = Work::default();
         let bytes = block.to_bytes().to_vec();
@@ -455,7 +453,7 @@ impl GroundPicture {
                         &first.1[1],
                         &[height, water, means].map(|b| b.as_entire_binding()),
                     ),
-                    group(device, &first.1[2], &[seen.clone()]),
+                    group(device, &first.1[2], std::slice::from_ref(&seen)),
                 ],
             ),
             (

@@ -48,7 +48,8 @@ impl Shape {
             Shape::Ridge => bump(a),
             Shape::Slope => -x,
             Shape::Bed => {
-                -0.5 * x + 0.5 * -bump((b - 0.4 * (4.0 * std::f64::consts::PI * x).sin()) / 0.08)
+                let middle = 0.2 * (4.0 * std::f64::consts::PI * x).sin();
+                -0.5 * x - 0.5 * bump((b - middle) / 0.1)
             }
         }
     }

@@ -337,8 +337,8 @@ fn ground_heights_come_from_maps() {
     assert_eq!([scene.columns, scene.rows], [20, 18]);
     scene.options.spacing = 30.0;
     let begin = scene.begin(gpu(), veduta::programs()).unwrap();
-    for k in 0..20 * 18 {
-        let wanted = 100.0 + 800.0 * f64::from(values[k]);
+    for (k, value) in values.iter().enumerate() {
+        let wanted = 100.0 + 800.0 * f64::from(*value);
         assert!((begin.ground(k % 20, k / 20) - wanted).abs() < 1e-4);
     }
     // Larger than the map: it repeats.
