@@ -14,6 +14,7 @@ pub mod render;
 pub mod shipped;
 pub mod stress;
 pub mod table;
+pub mod under_sky;
 
 pub use args::Args;
 pub use error::CliError;

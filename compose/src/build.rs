@@ -64,7 +64,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
         "cloud_tile" | "ground_plan" | "ground_level" | "ground_shallow" | "ground_advance"
-        | "ground_query" => {
+        | "ground_query" | "ground_surface" | "ground_normals" | "ground_picture" => {
             return vec![BTreeSet::new()];
         }
         "ground_edit" => {

@@ -2,12 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::camera::GroundCamera;
 use super::options::{Erosion, GroundOptions};
+use super::picture::GroundLook;
 use super::state::{CHANNELS, GroundState};
 use crate::device::Gpu;
 use crate::error::Error;
 use crate::program::ProgramSet;
-use crate::terrain::{HeightField, heights};
+use crate::terrain::{HeightField, HeightMap, heights};
 use crate::view::WorldPos;
 
 /// What is added to the heights of the field, over the middle of the ground.
@@ -26,6 +28,8 @@ pub enum Shape {
     Ridge,
     /// A slope that falls by `relief` from the first to the last column.
     Slope,
+    /// A plain that falls by half of `relief` from the first to the last column, with a winding river bed along x, half of `relief` deep.
+    Bed,
 }
 
 impl Shape {
@@ -43,6 +47,10 @@ impl Shape {
             Shape::Valley => -bump(a),
             Shape::Ridge => bump(a),
             Shape::Slope => -x,
+            Shape::Bed => {
+                let middle = 0.2 * (4.0 * std::f64::consts::PI * x).sin();
+                -0.5 * x - 0.5 * bump((b - middle) / 0.1)
+            }
         }
     }
 }
@@ -57,6 +65,8 @@ pub struct GroundScene {
     pub rows: u32,
     /// Heights; `None`: a plane.
     pub field: Option<HeightField>,
+    /// Heights of a map, a texel a cell from the first on, added to the field; its `origin` must be 0. A map's file is read by `GroundScene::read` (feature `height_maps`).
+    pub heights: Option<HeightMap>,
     /// Where the first cell lies on the field (m).
     pub origin: [f64; 2],
     /// Added to the field.
@@ -75,6 +85,10 @@ pub struct GroundScene {
     pub depth: f64,
     /// What it obeys.
     pub options: GroundOptions,
+    /// Where it is seen from; `None`: from the south and above.
+    pub camera: Option<GroundCamera>,
+    /// How its picture is coloured.
+    pub look: GroundLook,
 }
 
 impl Default for GroundScene {
@@ -83,6 +97,7 @@ impl Default for GroundScene {
             columns: 256,
             rows: 256,
             field: None,
+            heights: None,
             origin: [0.0; 2],
             shape: Shape::Even,
             relief: 0.0,
@@ -92,6 +107,8 @@ impl Default for GroundScene {
             water_share: 1.0,
             depth: 0.0,
             options: GroundOptions::default(),
+            camera: None,
+            look: GroundLook::default(),
         }
     }
 }
@@ -206,7 +223,7 @@ impl GroundScene {
         Ok(scene)
     }
 
-    /// Sets a key, which is a field's name in upper case; RAIN, EVAPORATION and SEEPAGE in mm/h; SPRING adds one by `x,z,radius,rate`; EROSION is `on` or `off`.
+    /// Sets a key, which is a field's name in upper case; RAIN, EVAPORATION and SEEPAGE in mm/h; SPRING adds one by `x,z,radius,rate`, `none` takes all away; EROSION is `on` or `off`.
     ///
     /// # Errors
     /// [`Error::UnknownKey`], [`Error::WrongType`].
@@ -229,7 +246,9 @@ impl GroundScene {
             "COLUMNS" => self.columns = whole()?,
             "ROWS" => self.rows = whole()?,
             "SIZE" => [self.columns, self.rows] = [whole()?; 2],
-            "SHAPE" => self.shape = word(key, value, "Even, Hill, Lake, Valley, Ridge or Slope")?,
+            "SHAPE" => {
+                self.shape = word(key, value, "Even, Hill, Lake, Valley, Ridge, Slope or Bed")?
+            }
             "RELIEF" => self.relief = real()?,
             "ALTITUDE" => self.altitude = real()?,
             "SMOOTH" => self.smooth = whole()?,
@@ -263,6 +282,7 @@ impl GroundScene {
             "FRICTION" => o.friction = single()?,
             "LONGEST_STEP" => o.longest_step = single()?,
             "EROSION" => o.erosion = yes()?.then(|| o.erosion.unwrap_or_default()),
+            "SPRING" if value.trim() == "none" => o.springs.clear(),
             "SPRING" => {
                 let numbers = value
                     .split(',')
@@ -330,13 +350,57 @@ impl GroundScene {
         if let Some(field) = &self.field {
             field.check()?;
         }
+        if let Some(map) = &self.heights {
+            map.check()?;
+            for origin in map.origin {
+                within("heights.origin", origin, 0.0, 0.0)?;
+            }
+        }
+        if let Some(camera) = &self.camera {
+            camera.check()?;
+        }
+        self.look.check()?;
         self.options.check()
+    }
+
+    /// Reads a ground's file, and that of its height map, which is looked for beside it.
+    ///
+    /// # Errors
+    /// [`Error::Ron`] for a file that cannot be read, and as [`GroundScene::from_ron`]; as [`HeightMap::read`].
+    #[cfg(feature = "height_maps")]
+    pub fn read(path: &std::path::Path) -> Result<GroundScene, Error> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Error::Ron(format!("no ground: {}: {e}", path.display())))?;
+        let mut scene = GroundScene::from_ron(&text)?;
+        let folder = path.parent().unwrap_or(std::path::Path::new(""));
+        let field = scene.field.as_mut().and_then(|f| f.map.as_mut());
+        for map in scene.heights.iter_mut().chain(field) {
+            map.read(folder)?;
+        }
+        Ok(scene)
+    }
+
+    /// Takes a height map in the place of field and shape, a cell a texel.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for a map without values.
+    pub fn take_heights(&mut self, map: HeightMap) -> Result<(), Error> {
+        let size = map.texels.as_ref().map(|t| t.size());
+        // As every use of it says.
+        let _ = map.heights(0, 0)?;
+        if let Some([columns, rows]) = size {
+            [self.columns, self.rows] = [columns as u32, rows as u32];
+        }
+        self.field = None;
+        self.shape = Shape::Even;
+        self.heights = Some(map);
+        Ok(())
     }
 
     /// How it begins. Heights of the field are found on the device: submits and waits.
     ///
     /// # Errors
-    /// As [`GroundScene::check`], [`heights`] and [`GroundState::from_channels`].
+    /// As [`GroundScene::check`], [`heights`], a height map without values, and [`GroundState::from_channels`].
     pub fn begin(&self, gpu: &Gpu, programs: &ProgramSet) -> Result<GroundState, Error> {
         self.check()?;
         let (columns, rows) = (self.columns as usize, self.rows as usize);
@@ -353,6 +417,12 @@ impl GroundScene {
             let found = heights(gpu, programs, field, &places, spacing as f32)?;
             for (to, from) in ground.iter_mut().zip(&found) {
                 *to = f64::from(from.height);
+            }
+        }
+        if let Some(map) = &self.heights {
+            let found = map.heights(self.columns as i32, self.rows as i32)?;
+            for (to, from) in ground.iter_mut().zip(found) {
+                *to += from;
             }
         }
         for (k, height) in ground.iter_mut().enumerate() {

@@ -276,6 +276,7 @@ pub struct Ground {
     edit: Tools,
     query: Pass,
     range: [f32; 2],
+    changes: u64,
 }
 
 impl Ground {
@@ -492,6 +493,7 @@ impl Ground {
             edit,
             query,
             range: [0.0; 2],
+            changes: 0,
         };
         ground.set_state(queue, state)?;
         Ok(ground)
@@ -545,6 +547,7 @@ impl Ground {
             });
         }
         self.options = options.clone();
+        self.changes += 1;
         self.upload(queue);
         self.wake(queue);
         Ok(())
@@ -748,6 +751,7 @@ impl Ground {
             .collect();
         queue.write_buffer(&p.tiles, 4 * (CONTROL + self.tiles) as u64, &tops);
         self.parity = 0;
+        self.changes += 1;
         self.range = [low, high];
         self.upload(queue);
         self.wake(queue);
@@ -761,6 +765,7 @@ impl Ground {
             timestamp_writes: None,
         });
         let mut work = Work::default();
+        self.changes += u64::from(steps);
         for _ in 0..steps {
             for (bound, indirect) in [
                 (Some(&self.plan), false),
@@ -792,6 +797,22 @@ impl Ground {
         }
     }
 
+    /// What a picture reads: the block of the step, ground, water and its mean.
+    pub(super) fn shown(&self) -> [&wgpu::Buffer; 4] {
+        let p = &self.planes;
+        [&p.step, &p.ground, self.water_now(), &p.means]
+    }
+
+    /// Height from which the planes count (m), and how often what they hold may have changed.
+    pub(super) fn shown_as(&self) -> (f32, u64) {
+        (self.reference, self.changes)
+    }
+
+    /// Cells along x and z.
+    pub fn size(&self) -> [usize; 2] {
+        [self.columns, self.rows]
+    }
+
     /// Records a change of the ground or its water, and wakes all tiles. One edit a submission.
     ///
     /// # Errors
@@ -804,6 +825,7 @@ impl Ground {
         edit: &GroundEdit,
     ) -> Result<Work, Error> {
         edit.check()?;
+        self.changes += 1;
         let (number, height, wavelength) = match edit.tool {
             Tool::Raise => (0_i32, 0.0, 1.0),
             Tool::Smooth => (1, 0.0, 1.0),

@@ -73,6 +73,60 @@ pub fn slid(ground: f64, beside: f64, steepest: f64, rate: f64) -> f64 {
     rate * ((above - steepest).max(0.0) - (-above - steepest).max(0.0))
 }
 
+/// Level at which the water of a cell is shown, from levels and depths of its eight neighbours, those at the sides first.
+#[allow(clippy::too_many_arguments)]
+pub fn displayed_level(
+    level: f64,
+    water: f64,
+    side_levels: [f64; 4],
+    corner_levels: [f64; 4],
+    side_waters: [f64; 4],
+    corner_waters: [f64; 4],
+    least: f64,
+    sink: f64,
+) -> f64 {
+    if water >= least {
+        return level;
+    }
+    let neighbours = || {
+        side_levels
+            .into_iter()
+            .zip(side_waters)
+            .chain(corner_levels.into_iter().zip(corner_waters))
+    };
+    let share = water / least;
+    let lower = || neighbours().filter(|(z, _)| *z < level);
+    let weight: f64 = lower().map(|(_, w)| w).sum();
+    if weight > f64::from(1e-12_f32) {
+        let mean = lower().map(|(z, w)| z * w).sum::<f64>() / weight;
+        return level * share + mean * (1.0 - share);
+    }
+    let wettest = neighbours().fold(water, |most, (_, w)| most.max(w));
+    let t = (wettest / (0.1 * least)).clamp(0.0, 1.0);
+    let dry = if lower().next().is_some() {
+        1.0
+    } else {
+        1.0 - t * t * (3.0 - 2.0 * t)
+    };
+    level - dry * sink * (1.0 - share)
+}
+
+/// Unit normal by central differences, from the neighbours to -x, +x, -z and +z.
+pub fn fast_normal(left: f64, right: f64, low: f64, high: f64, spacing: f64) -> [f64; 3] {
+    let [x, y, z] = [left - right, 2.0 * spacing, low - high];
+    let length = (x * x + y * y + z * z).sqrt();
+    [x / length, y / length, z / length]
+}
+
+/// The level that a neighbour counts with in the normal of the water.
+pub fn counted_level(centre: f64, beside: f64, ground_beside: f64) -> f64 {
+    if beside < ground_beside {
+        centre
+    } else {
+        beside
+    }
+}
+
 /// What lies beyond the edges: open, closed or periodic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Edge {

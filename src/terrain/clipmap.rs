@@ -229,7 +229,7 @@ fn buffer(device: &wgpu::Device, label: &str, size: usize) -> wgpu::Buffer {
 }
 
 /// A bind group of resources in the order of their bindings.
-pub(super) fn group(
+pub(crate) fn group(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
     resources: &[wgpu::BindingResource<'_>],

@@ -178,7 +178,7 @@ impl HeightMap {
         }
     }
 
-    pub(super) fn check(&self) -> Result<(), Error> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         for (name, value) in [("lowest", self.lowest), ("highest", self.highest)] {
             if !(-2e4..=2e4).contains(&value) {
                 return Err(fault(name, value.to_string(), "in [-2e4, 2e4] m"));
@@ -190,17 +190,44 @@ impl HeightMap {
         }
     }
 
+    /// Its values, once they have been read or made.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for a map without values.
+    fn grid(&self) -> Result<&Grid, Error> {
+        match &self.texels {
+            Some(texels) => Ok(&texels.grid),
+            None => {
+                let value = format!("none, of the file `{}`", self.file);
+                let domain = "read (HeightMap::read, Land::read) or given by the program";
+                Err(fault("texels", value, domain))
+            }
+        }
+    }
+
+    /// Heights of `columns` x `rows` texels from the first on, by rows, beyond the border as its edge says (m).
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for a map without values.
+    pub(crate) fn heights(&self, columns: i32, rows: i32) -> Result<Vec<f64>, Error> {
+        let Grid { size, values, .. } = self.grid()?;
+        let scale = self.highest - self.lowest;
+        let of = |x: i32, z: i32| {
+            let at = self.edge.texel(z, size[1]) * size[0] + self.edge.texel(x, size[0]);
+            self.lowest + scale * f64::from(values[at as usize])
+        };
+        Ok((0..rows)
+            .flat_map(|z| (0..columns).map(move |x| (x, z)))
+            .map(|(x, z)| of(x, z))
+            .collect())
+    }
+
     /// The pyramid for texels of a width (m).
     ///
     /// # Errors
     /// [`Error::OutOfDomain`] for a map without values, and for heights beyond 2e4 m.
     pub(super) fn pyramid(&self, texel: f64) -> Result<Arc<Pyramid>, Error> {
-        let Some(texels) = &self.texels else {
-            let value = format!("none, of the file `{}`", self.file);
-            let domain = "read (HeightMap::read, Land::read) or given by the program";
-            return Err(fault("texels", value, domain));
-        };
-        let grid = &texels.grid;
+        let grid = self.grid()?;
         let scale = self.highest - self.lowest;
         let key = [
             self.edge.number() as u64,

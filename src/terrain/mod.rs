@@ -25,6 +25,7 @@ mod surface;
 mod system;
 
 pub use calibrate::{Tail, Tails};
+pub(crate) use clipmap::group;
 pub use clipmap::{Clipmap, ClipmapOptions};
 pub use field::{Bounds, Domain, HeightField, Kind};
 pub use globe::{Globe, GlobeGround, GlobePlace};
@@ -41,4 +42,5 @@ pub use probe::heights;
 pub use rays::{RayPath, TerrainHit, TerrainRay, ray_hits};
 pub use real::Real;
 pub use surface::Terrain;
+pub(crate) use system::surface_pipeline;
 pub use system::{TerrainLights, TerrainOptions};

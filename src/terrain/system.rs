@@ -103,7 +103,7 @@ pub(super) struct PlaneTerrain {
 }
 
 /// A pipeline that draws ground into targets with a depth of the given format, and the layouts of its groups.
-pub(super) fn surface_pipeline(
+pub(crate) fn surface_pipeline(
     device: &wgpu::Device,
     programs: &ProgramSet,
     program: &str,

@@ -8,12 +8,12 @@ use veduta::reference::ground::{Cells, Edge, Shallow};
 
 use crate::common::{Random, gpu};
 
-fn made(options: &GroundOptions, state: &GroundState) -> Ground {
+pub fn made(options: &GroundOptions, state: &GroundState) -> Ground {
     let gpu = gpu();
     Ground::new(&gpu.device, &gpu.queue, veduta::programs(), options, state).unwrap()
 }
 
-fn steps(ground: &mut Ground, count: u32) {
+pub fn steps(ground: &mut Ground, count: u32) {
     let mut left = count;
     while left > 0 {
         let now = left.min(256);
@@ -24,20 +24,24 @@ fn steps(ground: &mut Ground, count: u32) {
     }
 }
 
-fn run(options: &GroundOptions, state: &GroundState, count: u32) -> (GroundState, GroundReport) {
+pub fn run(
+    options: &GroundOptions,
+    state: &GroundState,
+    count: u32,
+) -> (GroundState, GroundReport) {
     let mut ground = made(options, state);
     steps(&mut ground, count);
     (ground.state(gpu()).unwrap(), ground.report(gpu()).unwrap())
 }
 
-fn flat(columns: usize, rows: usize, height: impl Fn(f64, f64) -> f64) -> GroundState {
+pub fn flat(columns: usize, rows: usize, height: impl Fn(f64, f64) -> f64) -> GroundState {
     let heights: Vec<f32> = (0..rows * columns)
         .map(|k| height((k % columns) as f64, (k / columns) as f64) as f32)
         .collect();
     GroundState::from_heights(columns, rows, &heights).unwrap()
 }
 
-fn hilly(columns: usize, rows: usize, altitude: f64, seed: u64) -> GroundState {
+pub fn hilly(columns: usize, rows: usize, altitude: f64, seed: u64) -> GroundState {
     let mut random = Random(seed);
     let phase: Vec<f64> = (0..8)
         .map(|_| random.uniform(0.0, std::f64::consts::TAU))
@@ -664,7 +668,7 @@ fn ground_erodes_lays_down_and_slides() {
     assert_eq!(report.active_tiles, 0);
 }
 
-fn edited(ground: &mut Ground, edit: &GroundEdit) {
+pub fn edited(ground: &mut Ground, edit: &GroundEdit) {
     let mut encoder = gpu().device.create_command_encoder(&Default::default());
     let _ = ground
         .edit(&gpu().device, &gpu().queue, &mut encoder, edit)
@@ -841,6 +845,8 @@ fn ground_shapes_are_those_that_they_are_called() {
         (Shape::Lake, -99.0, 0.0, 0.0),
         (Shape::Valley, -99.0, 0.0, -99.0),
         (Shape::Ridge, 99.0, 0.0, 99.0),
+        // The river begins and crosses in the middle of the plain.
+        (Shape::Bed, -75.3, -50.3, -25.3),
     ] {
         let state = profile(shape, 0);
         for (found, wanted) in [

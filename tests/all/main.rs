@@ -16,6 +16,8 @@ mod fractal;
 mod getting_started;
 mod globe;
 mod ground;
+mod ground_picture;
+mod ground_rows;
 mod hash;
 mod land;
 mod landscape;

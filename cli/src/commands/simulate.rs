@@ -4,12 +4,23 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use veduta::ground::{CHANNELS, Ground, GroundReport, GroundScene, GroundState};
+use veduta::WorldPos;
+use veduta::ground::{
+    CHANNELS, Ground, GroundCamera, GroundPicture, GroundPictureOptions, GroundReport, GroundScene,
+    GroundState, Triangulation,
+};
+use veduta::terrain::{HeightMap, TerrainLights};
 
 use crate::cpu::CpuTime;
 use crate::error::CliError;
 use crate::image::{check_folder, check_output, numbered, write_png};
+use crate::metrics::Picture;
+use crate::render::Size;
 use crate::table::{read_cube, write_cube};
+use crate::under_sky::UnderSky;
+
+use super::probe::atmosphere;
+use super::sky::exposure_of;
 
 /// Arguments of `veduta simulate`.
 #[derive(Debug, Clone, clap::Args)]
@@ -26,6 +37,15 @@ pub struct SimulateArgs {
     /// The state to begin with, .npy: float32, rows, columns, 8 to 14 channels; the scene's own when left out
     #[arg(long = "in", value_name = "STATE.npy")]
     pub input: Option<PathBuf>,
+    /// Heights, a cell a texel, in the place of the scene's: .png (grey, 8 or 16 bits), .exr or .npy
+    #[arg(long, value_name = "FILE")]
+    pub heights: Option<PathBuf>,
+    /// Height of a value of 0 in --heights in metres
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub lowest: f64,
+    /// Height of a value of 1 in --heights in metres: the greatest of a .png; 1 for files that hold metres
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
+    pub highest: f64,
     /// Where the last state goes, .npy with 14 channels
     #[arg(long, value_name = "STATE.npy")]
     pub out: Option<PathBuf>,
@@ -35,6 +55,36 @@ pub struct SimulateArgs {
     /// Pictures' path; beside --out or in this folder when left out
     #[arg(long, value_name = "PICTURE.png")]
     pub pictures: Option<PathBuf>,
+    /// Draw the ground from above, a pixel a cell, instead of under the sky
+    #[arg(long)]
+    pub map: bool,
+    /// Width and height of the pictures in pixels
+    #[arg(long, value_name = "WxH", default_value = "512x288")]
+    pub size: Size,
+    /// Place of the eye in metres from the first cell, y up; the scene's camera when left out
+    #[arg(long, value_name = "X,Y,Z", value_parser = three, allow_hyphen_values = true)]
+    pub eye: Option<[f64; 3]>,
+    /// Place that the eye looks at
+    #[arg(long, value_name = "X,Y,Z", value_parser = three, allow_hyphen_values = true)]
+    pub target: Option<[f64; 3]>,
+    /// Vertical field of view in degrees, 0.01 to 170
+    #[arg(long)]
+    pub fov: Option<f64>,
+    /// Height of the sun above the horizon in degrees
+    #[arg(long, allow_negative_numbers = true)]
+    pub sun_height: Option<f64>,
+    /// Azimuth of the sun in degrees, clockwise from -z
+    #[arg(long, allow_negative_numbers = true)]
+    pub sun_azimuth: Option<f64>,
+    /// A shipped atmosphere or a .ron file
+    #[arg(long, value_name = "NAME|FILE", default_value = "earth")]
+    pub atmosphere: String,
+    /// Factor on radiance before the tone map; found from the first picture when left out
+    #[arg(long)]
+    pub exposure: Option<f64>,
+    /// How squares become triangles
+    #[arg(long, value_enum, default_value = "random")]
+    pub triangles: Triangles,
     /// Where sums, times and extremes go
     #[arg(long, value_name = "STATS.json")]
     pub stats: Option<PathBuf>,
@@ -43,14 +93,121 @@ pub struct SimulateArgs {
     pub quiet: bool,
 }
 
+/// How squares of the ground become triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Triangles {
+    /// Two, along the same diagonal everywhere
+    Fixed,
+    /// Four around a middle
+    FourWay,
+    /// Two, along a diagonal by chance
+    Random,
+}
+
+/// Three numbers between commas.
+fn three(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map(|part| part.trim().parse::<f64>().map_err(|e| e.to_string()))
+        .collect::<Result<_, _>>()?;
+    numbers
+        .try_into()
+        .map_err(|v: Vec<f64>| format!("{} numbers, but three must be", v.len()))
+}
+
+/// The ground under its sky, from one place.
+struct Painter {
+    under: UnderSky,
+    picture: GroundPicture,
+    view: veduta::View,
+    lights: TerrainLights,
+    exposure: Option<f64>,
+}
+
+impl Painter {
+    fn new(args: &SimulateArgs, scene: &GroundScene, ground: &Ground) -> Result<Painter, CliError> {
+        let spacing = f64::from(scene.options.spacing);
+        let mut camera = scene
+            .camera
+            .unwrap_or_else(|| GroundCamera::over(ground.size(), spacing, ground.range()));
+        camera.eye = args.eye.unwrap_or(camera.eye);
+        camera.target = args.target.unwrap_or(camera.target);
+        camera.field_of_view = args.fov.unwrap_or(camera.field_of_view);
+        camera.sun_height = args.sun_height.unwrap_or(camera.sun_height);
+        camera.sun_azimuth = args.sun_azimuth.unwrap_or(camera.sun_azimuth);
+        if let Some(exposure) = args.exposure
+            && !(0.0..=1e12).contains(&exposure)
+        {
+            return Err(CliError::argument(
+                "--exposure",
+                exposure.to_string(),
+                "in [0, 1e12]",
+            ));
+        }
+        let air = atmosphere(&args.atmosphere)?;
+        let aspect = f64::from(args.size.width) / f64::from(args.size.height);
+        let mut view = camera.view(WorldPos::default(), aspect)?;
+        view.sun.angular_radius = air.sun.angular_radius as f32;
+        let mut under = UnderSky::new(air, args.size)?;
+        let lights = under.lights(&view, f64::from(ground.range()[0]))?;
+        let options = GroundPictureOptions {
+            triangulation: match args.triangles {
+                Triangles::Fixed => Triangulation::Fixed,
+                Triangles::FourWay => Triangulation::FourWay,
+                Triangles::Random => Triangulation::Random,
+            },
+            look: scene.look,
+            ..Default::default()
+        };
+        let gpu = veduta::device::shared()?;
+        let programs = veduta::programs();
+        let targets = UnderSky::targets();
+        let picture = GroundPicture::new(&gpu.device, programs, &targets, ground, &options)?;
+        Ok(Painter {
+            under,
+            picture,
+            view,
+            lights,
+            exposure: args.exposure,
+        })
+    }
+
+    fn paint(&mut self, ground: &Ground, path: &Path) -> Result<(), CliError> {
+        let queue = &veduta::device::shared()?.queue;
+        let Painter {
+            under,
+            picture,
+            view,
+            lights,
+            exposure,
+        } = self;
+        let cell = std::cell::RefCell::new(picture);
+        let rgb = under.paint(
+            view,
+            |encoder| {
+                let _ = cell
+                    .borrow_mut()
+                    .prepare(queue, encoder, ground, view, lights)?;
+                Ok(())
+            },
+            |pass| {
+                let _ = cell.borrow().draw_opaque(pass);
+            },
+        )?;
+        let exposure = *exposure.get_or_insert_with(|| exposure_of(&rgb));
+        let Size { width, height } = under.size();
+        let shown = Picture::new(width as usize, height as usize, rgb)?.display(exposure);
+        write_png(path, width, height, &shown)
+    }
+}
+
 /// A ground as its file says, or one that ships.
 fn scene(name: &str) -> Result<GroundScene, CliError> {
     let path = Path::new(name);
     if path.extension().is_none_or(|e| e != "ron") {
         return Ok(GroundScene::named(name)?);
     }
-    let text = std::fs::read_to_string(path).map_err(|e| CliError::read(path, e))?;
-    GroundScene::from_ron(&text).map_err(|e| CliError::Table {
+    GroundScene::read(path).map_err(|e| CliError::Table {
         path: path.to_owned(),
         what: e.to_string(),
     })
@@ -76,6 +233,16 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         check_folder(&pictures)?;
     }
     let mut scene = scene(&args.scene)?;
+    if let Some(file) = &args.heights {
+        let mut map = HeightMap {
+            file: file.display().to_string(),
+            lowest: args.lowest,
+            highest: args.highest,
+            ..Default::default()
+        };
+        map.read(Path::new(""))?;
+        scene.take_heights(map)?;
+    }
     for pair in &args.set {
         let Some((key, value)) = pair.split_once('=') else {
             return Err(CliError::argument("--set", pair, "KEY=VALUE"));
@@ -113,18 +280,23 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         ProgressStyle::with_template("{bar:40} {pos}/{len} steps, {eta} left")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
-    let picture = |state: &GroundState, step: u64| -> Result<(), CliError> {
+    let mut painter = if args.frames > 0 && !args.map {
+        Some(Painter::new(args, &scene, &ground)?)
+    } else {
+        None
+    };
+    let mut picture = |ground: &Ground, step: u64| -> Result<(), CliError> {
         let number = u32::try_from(step / args.frames.max(1)).unwrap_or(u32::MAX);
-        let rgb = relief(state, scene.options.spacing);
-        write_png(
-            &numbered(&pictures, number),
-            state.columns as u32,
-            state.rows as u32,
-            &rgb,
-        )
+        let path = numbered(&pictures, number);
+        if let Some(painter) = &mut painter {
+            return painter.paint(ground, &path);
+        }
+        let state = ground.state(gpu)?;
+        let rgb = relief(&state, scene.options.spacing);
+        write_png(&path, state.columns as u32, state.rows as u32, &rgb)
     };
     if args.frames > 0 {
-        picture(&begin, 0)?;
+        picture(&ground, 0)?;
     }
     let (started, mut cpu) = (Instant::now(), 0.0);
     let mut chunk = 4_u64;
@@ -154,7 +326,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         done += now;
         bar.set_position(done);
         if args.frames > 0 && done.is_multiple_of(args.frames) {
-            picture(&ground.state(gpu)?, done)?;
+            picture(&ground, done)?;
         }
     }
     bar.finish_and_clear();

@@ -1842,6 +1842,15 @@ pub fn registry() -> Vec<Entry> {
             four(&|k| ground::slid(a[k], b[k], steepest, rate))
         }
     );
+    same!(
+        list,
+        "ground::surface",
+        "ground",
+        ground,
+        displayed_level,
+        fast_normal,
+        counted_level
+    );
     other!(
         list,
         "terrain::shadow::soft_shadow",

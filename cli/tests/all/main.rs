@@ -11,5 +11,6 @@ mod lint;
 mod list;
 mod probe;
 mod render;
+mod simulate;
 mod stress;
 mod usage;
