@@ -1059,8 +1059,10 @@ fn the_air_of_planets_of_all_sizes_meets_quadrature() {
 #[test]
 fn the_bare_ground_reflects_sun_and_sky() {
     let gpu = gpu();
-    let mut air = Atmosphere::default();
-    air.ground_albedo = [0.6, 0.4, 0.2];
+    let air = Atmosphere {
+        ground_albedo: [0.6, 0.4, 0.2],
+        ..Default::default()
+    };
     let options = SkyOptions {
         atmosphere: air.clone(),
         ..Default::default()
