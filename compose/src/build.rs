@@ -76,16 +76,21 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 BTreeSet::from(["GROUND_EROSION".to_owned()]),
             ];
         }
-        "cloud_layer" | "cloud_probe" => {
-            let flag = if program == "cloud_layer" {
-                "CLOUD_OVER_DEPTH"
-            } else {
-                "CLOUD_TILE"
-            };
-            return vec![BTreeSet::new(), BTreeSet::from([flag.to_owned()])];
+        "cloud_probe" => {
+            return vec![BTreeSet::new(), BTreeSet::from(["CLOUD_TILE".to_owned()])];
+        }
+        "cloud_layer" => {
+            let ways: [&[&str]; 4] = [
+                &[],
+                &["CLOUD_OVER_DEPTH"],
+                &["CLOUD_ORDERS"],
+                &["CLOUD_ORDERS", "CLOUD_OVER_DEPTH"],
+            ];
+            let set = |flags: &&[&str]| flags.iter().map(|f| (*f).to_owned()).collect();
+            return ways.iter().map(set).collect();
         }
         "cloud_volume" => {
-            let ways: [&[&str]; 12] = [
+            let ways: [&[&str]; 13] = [
                 &[],
                 &["CLOUD_READS_NODES"],
                 &["CLOUD_NODES"],
@@ -98,6 +103,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 &["CLOUD_LAYERED", "CLOUD_SWEEP"],
                 &["CLOUD_LAYERED", "CLOUD_GATHER"],
                 &["CLOUD_LAYERED", "CLOUD_GATHER", "CLOUD_PROLONG"],
+                &["CLOUD_LAYERED", "CLOUD_PUBLISH"],
             ];
             let set = |flags: &&[&str]| flags.iter().map(|f| (*f).to_owned()).collect();
             return ways.iter().map(set).collect();

@@ -5,6 +5,7 @@ mod deck;
 mod directions;
 mod layer_orders;
 mod layer_rays;
+mod order_table;
 mod phase;
 mod system;
 mod tile;

@@ -93,7 +93,8 @@ impl Canvas<'_> {
         let gpu = &self.bench.gpu;
         let lights = CloudLights {
             sun: view.sun.irradiance,
-            ambient: Vec3::ZERO,
+            above: Vec3::ZERO,
+            below: Vec3::ZERO,
         };
         let target = self.texture.create_view(&Default::default());
         spent(|| {

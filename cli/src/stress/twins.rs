@@ -62,6 +62,14 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "a_layer_from_its_tile_meets_the_march",
     ),
     (
+        "veduta::clouds::tile::march_tile_orders",
+        "thick_clouds_of_all_orders_meet_paths",
+    ),
+    (
+        "veduta::clouds::tile::cells_at",
+        "thick_clouds_of_all_orders_meet_paths",
+    ),
+    (
         "veduta::clouds::tile::tile_at",
         "a_layer_from_its_tile_meets_the_march",
     ),
