@@ -63,8 +63,10 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         "terrain_rays" | "terrain_globe_rays" => {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
-        "cloud_tile" | "ground_plan" | "ground_level" | "ground_shallow" | "ground_advance"
-        | "ground_query" => {
+        "cloud_tile" => {
+            return vec![BTreeSet::new(), BTreeSet::from(["CLOUD_SHAPED".to_owned()])];
+        }
+        "ground_plan" | "ground_level" | "ground_shallow" | "ground_advance" | "ground_query" => {
             return vec![BTreeSet::new()];
         }
         "ground_edit" => {
@@ -77,7 +79,12 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             ];
         }
         "cloud_probe" => {
-            return vec![BTreeSet::new(), BTreeSet::from(["CLOUD_TILE".to_owned()])];
+            return vec![
+                BTreeSet::new(),
+                BTreeSet::from(["CLOUD_TILE".to_owned()]),
+                BTreeSet::from(["CLOUD_SHADOW".to_owned()]),
+                BTreeSet::from(["CLOUD_SHAPED".to_owned()]),
+            ];
         }
         "cloud_layer" => {
             let ways: [&[&str]; 4] = [

@@ -29,6 +29,8 @@ pub(super) struct LayerOrders<'a> {
     gpu: &'a Gpu,
     block: GridBlock,
     thickness: f64,
+    /// Sine of the lowest sun.
+    lowest: f32,
     peaks: wgpu::Buffer,
     fill: Kernel,
     sweep: Kernel,
@@ -67,6 +69,7 @@ impl<'a> LayerOrders<'a> {
             gpu,
             block,
             thickness: deck.thickness,
+            lowest: deck.lowest_sun(levels),
             peaks: filled(gpu, &peaks),
             fill: kernel(&["CLOUD_CELLS"])?,
             sweep: kernel(&["CLOUD_SWEEP"])?,
@@ -80,7 +83,7 @@ impl<'a> LayerOrders<'a> {
         let to_sun = to_sun.map(|c| c as f32);
         GridBlock {
             to_sun,
-            shear: slant(to_sun).0,
+            shear: slant(to_sun, self.lowest).0,
             sun: lighting.sun,
             uniform_light: lighting.around[0],
             below: lighting.around[1],

@@ -78,6 +78,8 @@ pub(super) struct OrderTable {
     pub kept: f32,
     /// The source of an even radiance of 1.
     even: f32,
+    /// Sine of the lowest sun.
+    lowest: f32,
     /// Gain and momentum of the sun's light.
     pace: (f32, f32),
     /// Parts of the fine cells that are filled from the tile that is shown.
@@ -235,6 +237,7 @@ impl OrderTable {
         let kept = 1.0 - lobes.albedo * lobes.peak();
         Ok(OrderTable {
             even: block.degrees[0],
+            lowest: deck.lowest_sun(tile.levels),
             pace: lobes.pace(),
             kept: kept as f32,
             weights: filled(&weights.to_bytes())?,
@@ -385,7 +388,7 @@ impl OrderTable {
             gain,
             momentum,
             to_sun,
-            shear: slant(to_sun).0,
+            shear: slant(to_sun, self.lowest).0,
             sun: amount(0),
             uniform_light: amount(1),
             below: amount(2),

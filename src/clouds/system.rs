@@ -194,7 +194,20 @@ pub struct Clouds {
     last_sun: Option<Vec3>,
     /// Whether the first tile was baked in this frame.
     fresh: bool,
+    /// Fields of `CloudTile` for the last eye.
+    placed: Option<[f32; 10]>,
     seen: bool,
+}
+
+/// What a host's shader needs for the shadow of a layer: `cloud_shadow` of the module `veduta::clouds::tile`.
+#[derive(Debug, Clone, Copy)]
+pub struct CloudShadow<'a> {
+    /// The tile, `texture_3d<f32>`. Another one after some calls of [`Clouds::prepare`] while the sun moves: bind it anew then.
+    pub tile: &'a wgpu::TextureView,
+    /// Its sampler, which filters.
+    pub sampler: &'a wgpu::Sampler,
+    /// The fields of `CloudTile` in their order, for positions relative to the eye of the last [`Clouds::prepare`]; anew after each.
+    pub layer: [f32; 10],
 }
 
 impl Clouds {
@@ -258,7 +271,7 @@ impl Clouds {
         } else {
             (texels, quality.levels)
         };
-        let tile = Tile::new(device, programs, &texels, levels)?;
+        let tile = Tile::new(device, programs, &options.deck, &texels, levels)?;
         let all = options.orders == Orders::All;
         let orders = if all && !options.deck.is_empty() {
             let table = OrderTable::new(device, programs, &options.deck, &tile, quality.cells)?;
@@ -354,6 +367,7 @@ impl Clouds {
             coming: None,
             last_sun: None,
             fresh: false,
+            placed: None,
             seen: true,
         };
         if !options.over_depth {
@@ -418,6 +432,17 @@ impl Clouds {
         self.host = Some(depth.clone());
         self.bind(device);
         Ok(())
+    }
+
+    /// What hosts need to shade their own things; none before the first [`Clouds::prepare`] of a view that can show the layer, and for a layer without clouds, whose
+    /// shadow is 1 everywhere. Straight light alone: what the clouds scatter down is not in it.
+    pub fn shadow(&self) -> Option<CloudShadow<'_>> {
+        let (shown, _) = self.shown?;
+        Some(CloudShadow {
+            tile: &self.tile.views[shown],
+            sampler: &self.tile.sampler,
+            layer: self.placed?,
+        })
     }
 
     /// The layer.
@@ -487,7 +512,12 @@ impl Clouds {
         }
         let to_sun = view.sun.to_light.normalize_or(Vec3::Y);
         let before = self.shown;
-        self.bake(queue, encoder, to_sun, &mut work);
+        if lights.sun.max_element() > 0.0 || self.shown.is_none() {
+            self.bake(queue, encoder, to_sun, &mut work);
+        } else {
+            // At night no tile is needed for where the sun goes.
+            (self.last_sun, self.fresh) = (None, false);
+        }
         if let (Some(table), Some((shown, sun))) = (&mut self.orders, self.shown) {
             let fresh = self.fresh;
             let swapped = before.is_some_and(|b| b.0 != shown);
@@ -534,7 +564,7 @@ impl Clouds {
             kept: self.orders.as_ref().map_or(1.0, |table| table.kept),
             extinction: deck.extinction as f32,
             place: [place(0)?, place(2)?],
-            shear: slant(sun.to_array()).0,
+            shear: slant(sun.to_array(), deck.lowest_sun(self.tile.levels)).0,
             tiles_per_metre: (1.0 / period) as f32,
             bottom: deck.bottom as f32,
             thickness: deck.thickness as f32,
@@ -550,6 +580,18 @@ impl Clouds {
             clear: deck.clear_way() as f32,
             ..Default::default()
         };
+        self.placed = Some([
+            block.place[0],
+            block.place[1],
+            block.shear[0],
+            block.shear[1],
+            block.tiles_per_metre,
+            block.bottom,
+            block.thickness,
+            block.levels,
+            block.extinction,
+            block.clear,
+        ]);
         let bytes = block.to_bytes().to_vec();
         if bytes != self.held {
             queue.write_buffer(&self.view, 0, &bytes);

@@ -4,7 +4,7 @@ use crate::common::gpu;
 use veduta::atmosphere::ProbeRay;
 use veduta::clouds::{
     CloudDeck, CloudLights, CloudQuality, Clouds, CloudsOptions, CubeOptions, CubeRay, DensityCube,
-    LayerOptions, Orders, ProbePath, cube_light, layer_light,
+    LayerOptions, Orders, ProbePath, back_to_front, cube_light, layer_light, layer_shadow,
 };
 use veduta::glam::{DVec3, Quat, Vec3};
 use veduta::reference::monte_carlo::Random;
@@ -499,6 +499,194 @@ fn clouds_with_wind_and_a_moved_eye_meet_the_query() {
     );
 }
 
+/// The marches through clouds with forms, and their tile, meet quadrature.
+#[test]
+fn clouds_with_forms_meet_quadrature() {
+    let deck = CloudDeck::named("fair").unwrap();
+    let to_sun = direction(0.8, 1.0).to_array();
+    let rays: Vec<ProbeRay> = layer_rays(to_sun)
+        .into_iter()
+        .map(|r| ProbeRay {
+            altitude: if r.altitude > 4000.0 && r.altitude < 6000.0 {
+                1500.0
+            } else {
+                r.altitude
+            },
+            ..r
+        })
+        .step_by(2)
+        .collect();
+    // Paths that end at the first scattering; the transmittance is by quadrature.
+    let paths = VolumePaths {
+        samples: 600,
+        max_order: 1,
+        ..Default::default()
+    };
+    let truth = volume::layer_light(&deck, &rays, Orders::All, &paths);
+    let root = |of: &dyn Fn(usize) -> f64| {
+        ((0..truth.len()).map(|k| of(k).powi(2)).sum::<f64>() / truth.len() as f64).sqrt()
+    };
+    let (rms, noise) = (root(&|k| truth[k][0]), root(&|k| truth[k][1]));
+    for (path, worst, clear) in [
+        (ProbePath::Textbook, 0.02, 0.01),
+        (ProbePath::Fast, 0.2, 0.05),
+    ] {
+        let options = LayerOptions {
+            path,
+            orders: Orders::Single,
+            ..Default::default()
+        };
+        let found = layer_light(gpu(), veduta::programs(), &deck, &rays, &options).unwrap();
+        let off = root(&|k| f64::from(found[k].scatter) - truth[k][0]) / rms;
+        let through = root(&|k| f64::from(found[k].transmittance) - truth[k][2]);
+        println!(
+            "{path:?}: {off:.4} of the root mean square (noise {:.4}), transmittance {through:.4}",
+            noise / rms
+        );
+        assert!(
+            off < (worst * worst + (2.0 * noise / rms).powi(2)).sqrt(),
+            "{path:?} {off}"
+        );
+        if through >= clear {
+            for (k, ray) in rays.iter().enumerate() {
+                println!("{ray:?} {:?} {:?}", found[k], truth[k]);
+            }
+        }
+        assert!(through < clear, "{path:?} {through}");
+    }
+    let covered = truth.iter().filter(|t| t[2] < 0.5).count();
+    assert!((4..truth.len() - 2).contains(&covered), "{covered}");
+}
+
+/// Judges `cloud_shadow`: points on the ground, between, within and above, against the depth along the ray to the sun.
+#[test]
+fn shadows_of_clouds_meet_the_reference() {
+    use veduta::reference::clouds as exact;
+    let deck = CloudDeck::default();
+    let layer = exact::CloudLayer {
+        cell: [0; 3],
+        frac: [0.0; 3],
+        wavelength: deck.wavelength,
+        period: 1 << deck.period_doublings,
+        octaves: 6,
+        hurst: 1.0,
+        bottom: deck.bottom,
+        thickness: deck.thickness,
+        coverage: deck.coverage,
+        uniformity: deck.uniformity,
+        extinction: deck.extinction,
+        albedo: deck.albedo,
+        g_forward: deck.g_forward,
+        g_backward: deck.g_backward,
+        backward_share: deck.backward_share,
+        seed: deck.seed,
+    };
+    let to_sun = direction(0.8, 1.0).to_array();
+    let mut random = Random::new(8, 3);
+    let points: Vec<[f64; 3]> = (0..400)
+        .map(|k| {
+            let altitude = [0.0, 1500.0, 4600.0, 7000.0][k % 4];
+            let across = |random: &mut Random| 3e4 * (random.unit() - 0.5);
+            [across(&mut random), altitude, across(&mut random)]
+        })
+        .collect();
+    let found = layer_shadow(gpu(), veduta::programs(), &deck, to_sun, &points).unwrap();
+    let (mut square, mut shaded) = (0.0, 0);
+    for ([x, y, z], found) in points.iter().zip(&found) {
+        let wanted = if *y > 5500.0 {
+            1.0
+        } else {
+            // The layer is plane over so little a way.
+            let up = (deck.bottom - y).max(0.0);
+            let [sx, sy, sz] = to_sun;
+            let at = [x + up * sx / sy, 0.0, z + up * sz / sy];
+            let altitude = y.max(deck.bottom);
+            (-exact::sun_depth(&layer, 1e9, at, altitude, to_sun, sy, 600)).exp()
+        };
+        if *y > 5500.0 {
+            assert_eq!(*found, 1.0);
+        }
+        square += (f64::from(*found) - wanted).powi(2);
+        shaded += usize::from(wanted < 0.1);
+    }
+    let off = (square / points.len() as f64).sqrt();
+    println!(
+        "shadows off by {off:.4}, {shaded} of {} in shade",
+        points.len()
+    );
+    assert!(off < 0.03, "{off}");
+    assert!((40..280).contains(&shaded), "{shaded}");
+}
+
+/// Two layers over one picture, for eyes below, between and above: each lies before the one behind it.
+#[test]
+fn two_layers_lie_in_the_right_order() {
+    let host = Host::new();
+    let low = CloudDeck {
+        bottom: 1500.0,
+        thickness: 800.0,
+        seed: 9,
+        extinction: 0.004,
+        wind: [10.0, 0.0],
+        ..CloudDeck::default()
+    };
+    let high = CloudDeck {
+        bottom: 6000.0,
+        extinction: 0.002,
+        wind: [-30.0, 5.0],
+        ..CloudDeck::default()
+    };
+    let decks = [&high, &low];
+    for (altitude, pitch, first) in [
+        (300.0, 0.7, 0),
+        (4000.0, 0.5, 0),
+        (4000.0, -0.5, 0),
+        (12_000.0, -0.7, 1),
+    ] {
+        let mut view = looking(altitude, pitch);
+        view.time = 1000.0;
+        let order = back_to_front(altitude, &decks).unwrap();
+        assert_eq!(order[0], first);
+        let mut alone = Vec::new();
+        let mut both: Vec<Clouds> = Vec::new();
+        for deck in decks {
+            let options = CloudsOptions {
+                deck: deck.clone(),
+                ..small()
+            };
+            let new = || {
+                Clouds::new(
+                    &gpu().device,
+                    veduta::programs(),
+                    &Host::targets(),
+                    &options,
+                )
+                .unwrap()
+            };
+            alone.push(host.frame(&mut new(), &view).2);
+            both.push(new());
+        }
+        let words = host.layers(&mut both, &order, &view);
+        let [back, front] = [&alone[order[0]], &alone[order[1]]];
+        let (mut through, mut swapped) = (0.0_f32, 0.0_f32);
+        for (k, pixel) in words.chunks(4).enumerate() {
+            let at = |list: &[u16], c: usize| half(list[4 * k + c]);
+            let wanted = at(front, 0) + at(front, 3) * at(back, 0);
+            let wrong = at(back, 0) + at(back, 3) * at(front, 0);
+            let found = half(pixel[0]);
+            assert!(
+                (found - wanted).abs() < 2e-3 * (1.0 + wanted),
+                "{found} {wanted}"
+            );
+            through = through.max((half(pixel[3]) - at(front, 3) * at(back, 3)).abs());
+            swapped = swapped.max((wrong - wanted).abs());
+        }
+        assert!(through < 2e-3, "{through}");
+        // Only rays through both tell the order.
+        assert!(altitude == 4000.0 || swapped > 0.01, "{altitude} {swapped}");
+    }
+}
+
 /// A depth buffer's wall before the clouds hides them, one behind does not, and one within cuts them.
 #[test]
 fn a_host_s_depth_ends_the_march() {
@@ -616,6 +804,42 @@ impl Host {
     /// Work of a frame over black, and the 16-bit words of the picture.
     fn frame(&self, clouds: &mut Clouds, view: &View) -> (veduta::Work, veduta::Work, Vec<u16>) {
         self.lit_frame(clouds, view, &CloudLights::clear(view.sun.irradiance))
+    }
+
+    /// Several layers over black, in an order.
+    fn layers(&self, layers: &mut [Clouds], order: &[usize], view: &View) -> Vec<u16> {
+        let gpu = gpu();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let lights = CloudLights::clear(view.sun.irradiance);
+        for layer in layers.iter_mut() {
+            let _ = layer
+                .prepare(&gpu.queue, &mut encoder, view, &lights)
+                .unwrap();
+        }
+        let target = self.texture.create_view(&Default::default());
+        {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &target,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                ..Default::default()
+            });
+            for k in order {
+                let _ = layers[*k].composite(&mut pass).unwrap();
+            }
+        }
+        gpu.queue.submit([encoder.finish()]);
+        let bytes = gpu.read_texture(&self.texture).unwrap();
+        bytes
+            .chunks_exact(2)
+            .map(|b| u16::from_le_bytes([b[0], b[1]]))
+            .collect()
     }
 
     /// The same under other lights.
@@ -760,6 +984,20 @@ fn light_of_all_orders_comes_to_rest() {
         .map(|_| host.frame(&mut clouds, &view).0.dispatches)
         .sum();
     assert!(moved > 8 + 20, "{moved}");
+    // At night the sun may go where it will.
+    let night = CloudLights {
+        sun: Vec3::ZERO,
+        ..CloudLights::clear(Vec3::ONE)
+    };
+    for _ in 0..200 {
+        let _ = host.lit_frame(&mut clouds, &view, &night);
+    }
+    let turned = Quat::from_rotation_z(0.02) * view.sun.to_light;
+    view.sun.to_light = turned.normalize();
+    let work = host.lit_frame(&mut clouds, &view, &night).0;
+    assert_eq!((work.bakes, work.dispatches), (0, 0), "{work:?}");
+    let work = host.frame(&mut clouds, &view).0;
+    assert_eq!(work.bakes, 1, "{work:?}");
 }
 
 /// Rays through every fourth pixel of a view of the host.

@@ -223,8 +223,10 @@ pub fn run(
     };
     let programs = veduta::programs();
     let system = |quality: CloudQuality| {
+        // As the loop scatters.
         let options = CloudsOptions {
             quality,
+            orders: veduta::clouds::Orders::Single,
             ..Default::default()
         };
         Clouds::new(&gpu.device, programs, &targets, &options)
