@@ -2251,8 +2251,8 @@ fn particular(entry: Entry) -> Entry {
             .lin("shape.kind_spread", 0.0, 1.0)
             .lin("shape.coverage_spread", 0.0, 2.0)
             .lin("shape.detail", 0.0, 1.0)
-            .lin("shape.sharpness", 1.0, 32.0)
-            .lin("shape.weather_doublings", 1.0, 12.0)
+            .lin("shape.sharpness", 1.0, 8.0)
+            .lin("shape.weather_doublings", 1.0, 4.0)
             .weight(20.0),
         ("clouds::march", "layer_exit") => entry.layer().jumps("tangent rays", 1e-6).weight(2.0),
         ("clouds::march", "sun_depth") => entry
