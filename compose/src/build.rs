@@ -63,8 +63,11 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         "terrain_rays" | "terrain_globe_rays" => {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
-        "cloud_tile" | "ground_plan" | "ground_level" | "ground_shallow" | "ground_advance"
-        | "ground_query" | "ground_surface" | "ground_normals" | "ground_picture" => {
+        "cloud_tile" => {
+            return vec![BTreeSet::new(), BTreeSet::from(["CLOUD_SHAPED".to_owned()])];
+        }
+        "ground_plan" | "ground_level" | "ground_shallow" | "ground_advance" | "ground_query"
+        | "ground_surface" | "ground_normals" | "ground_picture" => {
             return vec![BTreeSet::new()];
         }
         "ground_edit" => {
@@ -76,16 +79,26 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 BTreeSet::from(["GROUND_EROSION".to_owned()]),
             ];
         }
-        "cloud_layer" | "cloud_probe" => {
-            let flag = if program == "cloud_layer" {
-                "CLOUD_OVER_DEPTH"
-            } else {
-                "CLOUD_TILE"
-            };
-            return vec![BTreeSet::new(), BTreeSet::from([flag.to_owned()])];
+        "cloud_probe" => {
+            return vec![
+                BTreeSet::new(),
+                BTreeSet::from(["CLOUD_TILE".to_owned()]),
+                BTreeSet::from(["CLOUD_SHADOW".to_owned()]),
+                BTreeSet::from(["CLOUD_SHAPED".to_owned()]),
+            ];
+        }
+        "cloud_layer" => {
+            let ways: [&[&str]; 4] = [
+                &[],
+                &["CLOUD_OVER_DEPTH"],
+                &["CLOUD_ORDERS"],
+                &["CLOUD_ORDERS", "CLOUD_OVER_DEPTH"],
+            ];
+            let set = |flags: &&[&str]| flags.iter().map(|f| (*f).to_owned()).collect();
+            return ways.iter().map(set).collect();
         }
         "cloud_volume" => {
-            let ways: [&[&str]; 12] = [
+            let ways: [&[&str]; 13] = [
                 &[],
                 &["CLOUD_READS_NODES"],
                 &["CLOUD_NODES"],
@@ -98,6 +111,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 &["CLOUD_LAYERED", "CLOUD_SWEEP"],
                 &["CLOUD_LAYERED", "CLOUD_GATHER"],
                 &["CLOUD_LAYERED", "CLOUD_GATHER", "CLOUD_PROLONG"],
+                &["CLOUD_LAYERED", "CLOUD_PUBLISH"],
             ];
             let set = |flags: &&[&str]| flags.iter().map(|f| (*f).to_owned()).collect();
             return ways.iter().map(set).collect();

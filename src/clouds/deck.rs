@@ -5,7 +5,40 @@ use serde::{Deserialize, Serialize};
 use super::fault;
 use crate::error::Error;
 
-/// A layer of clouds between two spheres around a planet: six octaves of value noise, cut by the coverage.
+/// What forms the clouds of a layer: weather over the land, a profile over the height that goes from stratus to cumulonimbus, heaps of billows, and finer ones that fray
+/// them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CloudShape {
+    /// Kind of the clouds, in [0, 1]: 0 stratus, 1/2 cumulus, 1 cumulonimbus, which fills the layer; the others lie in its lower part.
+    pub kind: f64,
+    /// What the weather adds to the kind at most, about; in [0, 1].
+    pub kind_spread: f64,
+    /// What the weather adds to the coverage at most, about; in [0, 2].
+    pub coverage_spread: f64,
+    /// The weather has 2 to this power cells over the period, in [1, 12].
+    pub weather_doublings: u32,
+    /// How far finer billows fray the edges, in [0, 1].
+    pub detail: f64,
+    /// Density over what the noise exceeds its threshold by, in [1, 32]: soft to hard edges.
+    pub sharpness: f64,
+}
+
+impl Default for CloudShape {
+    /// Cumulus.
+    fn default() -> Self {
+        CloudShape {
+            kind: 0.5,
+            kind_spread: 0.2,
+            coverage_spread: 0.4,
+            weather_doublings: 2,
+            detail: 0.5,
+            sharpness: 5.0,
+        }
+    }
+}
+
+/// A layer of clouds between two spheres around a planet: six octaves of value noise cut by the coverage, or clouds with forms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CloudDeck {
@@ -37,6 +70,8 @@ pub struct CloudDeck {
     pub seed: u32,
     /// Velocity along x and z (m/s), each in [-1000, 1000].
     pub wind: [f64; 2],
+    /// Forms of the clouds; none for value noise.
+    pub shape: Option<CloudShape>,
 }
 
 impl Default for CloudDeck {
@@ -57,6 +92,7 @@ impl Default for CloudDeck {
             backward_share: 0.5,
             seed: 2,
             wind: [0.0; 2],
+            shape: None,
         }
     }
 }
@@ -70,7 +106,7 @@ macro_rules! shipped {
     };
 }
 
-shipped!("thesis", "cumulus", "stratus");
+shipped!("thesis", "cumulus", "stratus", "fair", "deck", "towers");
 
 impl CloudDeck {
     /// Checks every field.
@@ -107,6 +143,25 @@ impl CloudDeck {
                 ));
             }
         }
+        if let Some(shape) = &self.shape {
+            let doublings = f64::from(shape.weather_doublings);
+            for (name, value, low, high) in [
+                ("kind", shape.kind, 0.0, 1.0),
+                ("kind_spread", shape.kind_spread, 0.0, 1.0),
+                ("coverage_spread", shape.coverage_spread, 0.0, 2.0),
+                ("weather_doublings", doublings, 1.0, 12.0),
+                ("detail", shape.detail, 0.0, 1.0),
+                ("sharpness", shape.sharpness, 1.0, 32.0),
+            ] {
+                if !(low..=high).contains(&value) {
+                    return Err(fault(
+                        &format!("deck.shape.{name}"),
+                        value,
+                        &format!("in [{low}, {high}]"),
+                    ));
+                }
+            }
+        }
         if self.period() > 1e9 {
             return Err(fault(
                 "deck.wavelength with deck.period_doublings",
@@ -122,9 +177,33 @@ impl CloudDeck {
         self.wavelength * f64::from(self.period_doublings.min(31)).exp2()
     }
 
+    /// Sine of the lowest height of the sun that a tile of so many levels is baked for, at least [`super::LOWEST_SUN`]: columns of the tile follow the sun's rays, which between
+    /// two levels go at most a twelfth of a wavelength across. A lower sun is taken to be that high.
+    pub fn lowest_sun(&self, levels: u32) -> f32 {
+        let level = self.thickness / f64::from(levels.max(2) - 1);
+        let tangent = 12.0 * level / self.wavelength;
+        let sine = tangent / (1.0 + tangent * tangent).sqrt();
+        (sine as f32).max(super::LOWEST_SUN).min(0.99)
+    }
+
+    /// Flags of the programs that have its noise.
+    pub(super) fn flags(&self) -> &'static [&'static str] {
+        if self.shape.is_some() {
+            &["CLOUD_SHAPED"]
+        } else {
+            &[]
+        }
+    }
+
     /// Way without clouds for each unit that the density before its cut is below 0 (m): the noise seldom rises by more than its whole range over half a
-    /// wavelength of the first octave.
+    /// wavelength of the first octave. Clouds with forms rise by their steepest slopes, which those of a kind's profile at its base are not.
     pub(super) fn clear_way(&self) -> f64 {
+        if let Some(shape) = &self.shape {
+            let filled = 1.0 - self.uniformity;
+            let along = (2.4 * filled + 5.0 * shape.detail) / self.wavelength;
+            let slope = along + 8.0 / self.thickness.max(1.0);
+            return 1.0 / (shape.sharpness * slope);
+        }
         0.5 * self.coverage * self.wavelength / (1.0 - self.uniformity).max(0.01)
     }
 
@@ -164,9 +243,50 @@ impl CloudDeck {
     }
 }
 
+/// In which order layers over one picture are to be laid, the first first, for an eye at an altitude (m): those above the eye from the highest down, then those below from the
+/// lowest up, last the one that the eye is in. So each lies before what is farther along every ray that meets it once.
+///
+/// # Errors
+/// [`Error::OutOfDomain`] for layers that overlap.
+pub fn back_to_front(altitude: f64, decks: &[&CloudDeck]) -> Result<Vec<usize>, Error> {
+    let mut order: Vec<usize> = (0..decks.len()).collect();
+    order.sort_by(|a, b| decks[*a].bottom.total_cmp(&decks[*b].bottom));
+    let top = |k: usize| decks[k].bottom + decks[k].thickness;
+    if let Some(pair) = order.windows(2).find(|p| top(p[0]) > decks[p[1]].bottom) {
+        return Err(fault(
+            &format!("decks[{}].bottom", pair[1]),
+            decks[pair[1]].bottom,
+            &format!("at least {} m, the top of the layer below it", top(pair[0])),
+        ));
+    }
+    let (above, rest): (Vec<usize>, Vec<usize>) =
+        order.into_iter().partition(|k| decks[*k].bottom > altitude);
+    let (inside, below): (Vec<usize>, Vec<usize>) =
+        rest.into_iter().partition(|k| top(*k) > altitude);
+    Ok(above.into_iter().rev().chain(below).chain(inside).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn layers_are_laid_from_back_to_front() {
+        let [low, middle, high] = [1000.0, 4000.0, 9000.0].map(|bottom| CloudDeck {
+            bottom,
+            thickness: 1000.0,
+            ..CloudDeck::default()
+        });
+        let order = |altitude: f64| back_to_front(altitude, &[&middle, &high, &low]).unwrap();
+        assert_eq!(order(0.0), [1, 0, 2]);
+        assert_eq!(order(3000.0), [1, 0, 2]);
+        assert_eq!(order(6000.0), [1, 2, 0]);
+        assert_eq!(order(20_000.0), [2, 0, 1]);
+        assert_eq!(order(4500.0), [1, 2, 0]);
+        assert_eq!(order(1500.0), [1, 0, 2]);
+        let error = back_to_front(0.0, &[&low, &low]).unwrap_err().to_string();
+        assert!(error.contains("decks[1].bottom"), "{error}");
+    }
 
     #[test]
     fn shipped_layers_are_read_and_faults_are_named() {
@@ -178,6 +298,7 @@ mod tests {
         for (text, name) in [
             ("(coverage: 1.5)", "deck.coverage"),
             ("(extinction: NaN)", "deck.extinction"),
+            ("(shape: Some((kind: 2)))", "deck.shape.kind"),
             ("(cover: 1)", "no clouds"),
         ] {
             let error = CloudDeck::from_ron(text).unwrap_err().to_string();

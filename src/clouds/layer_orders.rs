@@ -29,6 +29,8 @@ pub(super) struct LayerOrders<'a> {
     gpu: &'a Gpu,
     block: GridBlock,
     thickness: f64,
+    /// Sine of the lowest sun.
+    lowest: f32,
     peaks: wgpu::Buffer,
     fill: Kernel,
     sweep: Kernel,
@@ -46,25 +48,13 @@ impl<'a> LayerOrders<'a> {
         levels: u32,
         shortest: f64,
     ) -> Result<LayerOrders<'a>, Error> {
-        let lobes = Lobes {
-            albedo: deck.albedo,
-            g_forward: deck.g_forward,
-            g_backward: deck.g_backward,
-            backward_share: deck.backward_share,
-        };
+        let (block, lobes) = block_of(deck, levels);
+        let (gain, momentum) = lobes.pace();
         let block = GridBlock {
-            size: deck.period() as f32,
-            extinction: deck.extinction as f32,
-            albedo: deck.albedo as f32,
-            peak: lobes.peak() as f32,
-            degrees: lobes.degrees().map(|d| d as f32),
-            all_orders: 1,
-            bottom: deck.bottom as f32,
-            thickness: deck.thickness as f32,
-            ground_radius: deck.planet_radius as f32,
-            levels: levels as f32,
             step: shortest as f32,
-            ..Default::default()
+            gain,
+            momentum,
+            ..block
         };
         let kernel = |flags: &[&str]| {
             let flags: Vec<&str> = [&["CLOUD_LAYERED"], flags].concat();
@@ -79,6 +69,7 @@ impl<'a> LayerOrders<'a> {
             gpu,
             block,
             thickness: deck.thickness,
+            lowest: deck.lowest_sun(levels),
             peaks: filled(gpu, &peaks),
             fill: kernel(&["CLOUD_CELLS"])?,
             sweep: kernel(&["CLOUD_SWEEP"])?,
@@ -92,7 +83,7 @@ impl<'a> LayerOrders<'a> {
         let to_sun = to_sun.map(|c| c as f32);
         GridBlock {
             to_sun,
-            shear: slant(to_sun).0,
+            shear: slant(to_sun, self.lowest).0,
             sun: lighting.sun,
             uniform_light: lighting.around[0],
             below: lighting.around[1],
@@ -118,34 +109,47 @@ impl<'a> LayerOrders<'a> {
             let cells = storage(8 * count);
             let source = storage(4 * 24 * count);
             let moments = storage(64 * count);
+            let last = storage(64 * count);
             let radiance = storage(4 * 24 * count);
-            let ways = self.ways(edge, levels);
+            let faces = storage(4 * 24 * 2 * edge * edge);
+            let ways = filled(
+                self.gpu,
+                &ways(self.block.size, self.thickness, edge, levels),
+            );
             let head = vec![(0, uniform.as_entire_binding())];
+            let aimed = vec![
+                (0, uniform.as_entire_binding()),
+                (1, ways.as_entire_binding()),
+            ];
             let seen = vec![
                 (0, wgpu::BindingResource::Sampler(&tile.sampler)),
                 (1, wgpu::BindingResource::TextureView(&tile.views[0])),
             ];
             let mut encoder = device.create_command_encoder(&Default::default());
             let fill = groups(
-                self.gpu,
+                &self.gpu.device,
                 &self.fill,
                 &[head.clone(), seen, held(&[(1, &cells)])],
             );
             dispatch(&mut encoder, &self.fill, &fill, count.div_ceil(64));
             let gathered = |kernel: &Kernel, place: u32, from: &wgpu::Buffer| {
-                let read = held(&[(2, &ways), (3, &cells), (place, from)]);
+                let read = held(&[(3, &cells), (place, from)]);
                 groups(
-                    self.gpu,
+                    &self.gpu.device,
                     kernel,
-                    &[head.clone(), read, held(&[(3, &source), (4, &moments)])],
+                    &[
+                        aimed.clone(),
+                        read,
+                        held(&[(3, &source), (4, &moments), (8, &last)]),
+                    ],
                 )
             };
             let gather = gathered(&self.gather, 5, &radiance);
-            let read = held(&[(2, &ways), (3, &cells), (4, &source)]);
+            let read = held(&[(3, &cells), (4, &source)]);
             let sweep = groups(
-                self.gpu,
+                &self.gpu.device,
                 &self.sweep,
-                &[head.clone(), read, held(&[(2, &radiance)])],
+                &[aimed.clone(), read, held(&[(2, &radiance), (6, &faces)])],
             );
             match &coarser {
                 Some((coarse, _)) => {
@@ -166,29 +170,6 @@ impl<'a> LayerOrders<'a> {
             coarser = Some((moments, shape));
         }
         coarser.map_or_else(|| room(device, 64, usage), |c| c.0)
-    }
-
-    /// The directions with how each goes through cells, from level to level.
-    fn ways(&self, edge: usize, levels: usize) -> wgpu::Buffer {
-        let across = f64::from(self.block.size) / edge as f64;
-        let up = self.thickness / levels as f64;
-        let [n, k] = [edge as i32, levels as i32];
-        let mut bytes = Vec::with_capacity(24 * WAY);
-        for dir in directions() {
-            for h in harmonics(dir) {
-                bytes.extend((h as f32).to_le_bytes());
-            }
-            let sense = if dir[1] < 0.0 { -1 } else { 1 };
-            for number in [k, n, n, sense, n, 1, n * k, 0] {
-                bytes.extend(i32::to_le_bytes(number));
-            }
-            let rise = dir[1].abs();
-            let shift = up / across / rise;
-            for number in [-dir[0] * shift, -dir[2] * shift, up / rise, 0.0] {
-                bytes.extend((number as f32).to_le_bytes());
-            }
-        }
-        filled(self.gpu, &bytes)
     }
 
     /// The light along rays, for the sun of `tile` and `moments`.
@@ -226,7 +207,7 @@ impl<'a> LayerOrders<'a> {
         ];
         let head = vec![(0, uniform.as_entire_binding())];
         let written = vec![(5, exchange.output.as_entire_binding())];
-        let groups = groups(self.gpu, &self.rays, &[head, read, written]);
+        let groups = groups(&self.gpu.device, &self.rays, &[head, read, written]);
         let encoder = device.create_command_encoder(&Default::default());
         let workgroups = rays.len().div_ceil(64) as u32;
         let found = exchange.run(device, queue, encoder, &self.rays.0, &groups, workgroups)?;
@@ -241,8 +222,55 @@ impl<'a> LayerOrders<'a> {
     }
 }
 
-fn held<'b>(list: &[(u32, &'b wgpu::Buffer)]) -> Vec<(u32, wgpu::BindingResource<'b>)> {
+pub(super) fn held<'b>(list: &[(u32, &'b wgpu::Buffer)]) -> Vec<(u32, wgpu::BindingResource<'b>)> {
     list.iter()
         .map(|(k, b)| (*k, b.as_entire_binding()))
         .collect()
+}
+
+/// The directions with how each goes through cells, from level to level.
+pub(super) fn ways(period: f32, thickness: f64, edge: usize, levels: usize) -> Vec<u8> {
+    let across = f64::from(period) / edge as f64;
+    let up = thickness / levels as f64;
+    let [n, k] = [edge as i32, levels as i32];
+    let mut bytes = Vec::with_capacity(24 * WAY);
+    for dir in directions() {
+        for h in harmonics(dir) {
+            bytes.extend((h as f32).to_le_bytes());
+        }
+        let sense = if dir[1] < 0.0 { -1 } else { 1 };
+        for number in [k, n, n, sense, n, 1, n * k, 0] {
+            bytes.extend(i32::to_le_bytes(number));
+        }
+        let rise = dir[1].abs();
+        let shift = up / across / rise;
+        for number in [-dir[0] * shift, -dir[2] * shift, up / rise, 0.0] {
+            bytes.extend((number as f32).to_le_bytes());
+        }
+    }
+    bytes
+}
+
+/// What is the same for every sun and grid.
+pub(super) fn block_of(deck: &CloudDeck, levels: u32) -> (GridBlock, Lobes) {
+    let lobes = Lobes {
+        albedo: deck.albedo,
+        g_forward: deck.g_forward,
+        g_backward: deck.g_backward,
+        backward_share: deck.backward_share,
+    };
+    let block = GridBlock {
+        size: deck.period() as f32,
+        extinction: deck.extinction as f32,
+        albedo: deck.albedo as f32,
+        peak: lobes.peak() as f32,
+        degrees: lobes.degrees().map(|d| d as f32),
+        all_orders: 1,
+        bottom: deck.bottom as f32,
+        thickness: deck.thickness as f32,
+        ground_radius: deck.planet_radius as f32,
+        levels: levels as f32,
+        ..Default::default()
+    };
+    (block, lobes)
 }

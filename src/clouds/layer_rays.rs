@@ -1,7 +1,7 @@
 //! Light of a layer of clouds alone along given rays: a query.
 
 use super::layer_orders::{LayerOrders, Lighting};
-use super::tile::{LOWEST_SUN, Tile, slant};
+use super::tile::{Tile, slant};
 use super::{CloudDeck, CubeLight, Orders, ProbePath, fault};
 use crate::atmosphere::ProbeRay;
 use crate::device::Gpu;
@@ -41,7 +41,7 @@ impl Default for LayerOptions {
 ///
 /// Light of all orders is that of a layer over a plane that repeats, without the planet's curvature, swept over cells as in [`super::cube_light`]; what light
 /// from above and from below shows of itself behind the clouds is not counted. The sun's depths are those of a sun that is at least as high as
-/// [`LOWEST_SUN`]; where it is lower, rays of single scattering are marched on both paths.
+/// [`CloudDeck::lowest_sun`]; where it is lower, rays of single scattering are marched on both paths.
 ///
 /// # Errors
 /// As [`CloudDeck::check`]; [`Error::OutOfDomain`] for options; the faults of making pipelines; [`Error::Device`].
@@ -90,12 +90,11 @@ pub fn layer_light(
             None => groups.push((ray.to_sun, vec![i])),
         }
     }
-    let (device, queue) = (&gpu.device, &gpu.queue);
     if all {
         let textbook = path == ProbePath::Textbook;
         let shortest = deck.thickness / if textbook { 256.0 } else { 64.0 };
         let solver = LayerOrders::new(gpu, programs, deck, 64, shortest)?;
-        let tile = Tile::new(device, programs, &[512], 64)?;
+        let tile = Tile::new(&gpu.device, programs, deck, &[512], 64)?;
         let lighting = Lighting {
             sun: options.sun,
             around: options.around,
@@ -113,25 +112,129 @@ pub fn layer_light(
         }
         return Ok(light);
     }
-    let marched = compute(device, programs, "cloud_probe", &[], &[])?;
-    let mut baked = None;
+    let (mut marched, mut baked) = (None, None);
     for (to_sun, members) in &groups {
         let sun = to_sun.map(|c| c as f32);
-        let fast = path == ProbePath::Fast && sun[1] >= LOWEST_SUN;
-        if fast && baked.is_none() {
-            let kernel = compute(device, programs, "cloud_probe", &["CLOUD_TILE"], &[])?;
-            baked = Some((Tile::new(device, programs, &[512], 64)?, kernel));
+        let fast = path == ProbePath::Fast && sun[1] >= deck.lowest_sun(64);
+        let rows: Vec<[f32; 5]> = members
+            .iter()
+            .map(|i| {
+                let ray = &rays[*i];
+                let [x, y, z] = ray.dir.map(|c| c as f32);
+                [x, y, z, ray.altitude as f32, ray.distance.min(1e9) as f32]
+            })
+            .collect();
+        let (query, kind) = if fast {
+            (&mut baked, Kind::Tile)
+        } else {
+            (&mut marched, Kind::March)
+        };
+        let query = match query {
+            Some(query) => query,
+            none => none.insert(Query::new(gpu, programs, deck, kind)?),
+        };
+        for (i, found) in members.iter().zip(query.ask(sun, &rows)?) {
+            light[*i] = CubeLight {
+                scatter: options.sun * found.scatter,
+                ..found
+            };
         }
-        let tile = baked.as_ref().filter(|_| fast);
-        if let Some((tile, _)) = tile {
+    }
+    Ok(light)
+}
+
+/// Share of the sun's light that a layer lets straight through to points: (x, altitude, z) in metres, from the tile that `Clouds` and `cloud_shadow` read, with suns
+/// below [`CloudDeck::lowest_sun`] taken to be that high. What the clouds scatter down is not counted. Submits and waits.
+///
+/// # Errors
+/// As [`CloudDeck::check`]; [`Error::OutOfDomain`] for points that are not finite; the faults of making pipelines; [`Error::Device`].
+pub fn layer_shadow(
+    gpu: &Gpu,
+    programs: &ProgramSet,
+    deck: &CloudDeck,
+    to_sun: [f64; 3],
+    points: &[[f64; 3]],
+) -> Result<Vec<f32>, Error> {
+    deck.check()?;
+    for (number, point) in points.iter().enumerate() {
+        if point.iter().any(|c| !c.is_finite()) {
+            let value = format!("{point:?}");
+            return Err(fault(&format!("point {number}"), value, "finite"));
+        }
+    }
+    if deck.is_empty() {
+        return Ok(vec![1.0; points.len()]);
+    }
+    let period = deck.period();
+    let rows = points
+        .iter()
+        .map(|[x, y, z]| {
+            let [x, z] = [x, z].map(|c| c.rem_euclid(period) as f32);
+            [x, 0.0, z, *y as f32, 0.0]
+        })
+        .collect::<Vec<_>>();
+    let query = Query::new(gpu, programs, deck, Kind::Shadow)?;
+    let found = query.ask(to_sun.map(|c| c as f32), &rows)?;
+    Ok(found.into_iter().map(|l| l.transmittance).collect())
+}
+
+/// What the program is asked for.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    March,
+    Tile,
+    Shadow,
+}
+
+/// The program with its tile, where it reads one.
+struct Query<'a> {
+    gpu: &'a Gpu,
+    deck: &'a CloudDeck,
+    pipeline: wgpu::ComputePipeline,
+    layouts: Vec<wgpu::BindGroupLayout>,
+    tile: Option<Tile>,
+}
+
+impl<'a> Query<'a> {
+    fn new(
+        gpu: &'a Gpu,
+        programs: &ProgramSet,
+        deck: &'a CloudDeck,
+        kind: Kind,
+    ) -> Result<Query<'a>, Error> {
+        let flags = match kind {
+            Kind::March => deck.flags(),
+            Kind::Tile => &["CLOUD_TILE"],
+            Kind::Shadow => &["CLOUD_SHADOW"],
+        };
+        let (pipeline, layouts) = compute(&gpu.device, programs, "cloud_probe", flags, &[])?;
+        let tile = match kind {
+            Kind::March => None,
+            _ => Some(Tile::new(&gpu.device, programs, deck, &[512], 64)?),
+        };
+        Ok(Query {
+            gpu,
+            deck,
+            pipeline,
+            layouts,
+            tile,
+        })
+    }
+
+    /// Rows of direction, altitude and distance, with the light of each.
+    fn ask(&self, sun: [f32; 3], list: &[[f32; 5]]) -> Result<Vec<CubeLight>, Error> {
+        let (gpu, deck) = (self.gpu, self.deck);
+        let (device, queue) = (&gpu.device, &gpu.queue);
+        if let Some(tile) = &self.tile {
             bake(gpu, tile, deck, sun);
         }
-        let (pipeline, layouts) = tile.map_or(&marched, |(_, kernel)| kernel);
-        for part in members.chunks(1 << 12) {
+        let mut light = Vec::with_capacity(list.len());
+        let shape = deck.shape.clone().unwrap_or_default();
+        for part in list.chunks(1 << 12) {
             let block = ProbeBlock {
                 to_sun: sun,
                 ground_radius: deck.planet_radius as f32,
-                shear: slant(sun).0,
+                shear: slant(sun, deck.lowest_sun(64)).0,
                 edge: deck.period() as f32,
                 levels: 64.0,
                 bottom: deck.bottom as f32,
@@ -147,6 +250,12 @@ pub fn layer_light(
                 period_doublings: deck.period_doublings,
                 seed: deck.seed,
                 count: part.len() as i32,
+                kind: shape.kind as f32,
+                kind_spread: shape.kind_spread as f32,
+                coverage_spread: shape.coverage_spread as f32,
+                detail: shape.detail as f32,
+                sharpness: shape.sharpness as f32,
+                weather_doublings: shape.weather_doublings,
                 ..Default::default()
             };
             let uniform = device.create_buffer(&wgpu::BufferDescriptor {
@@ -157,18 +266,15 @@ pub fn layer_light(
             });
             queue.write_buffer(&uniform, 0, &block.to_bytes());
             let mut rows = Vec::with_capacity(32 * part.len());
-            for i in part {
-                let ray = &rays[*i];
-                let [x, y, z] = ray.dir;
-                let far = ray.distance.min(1e9);
-                for number in [x, y, z, ray.altitude, far, 0.0, 0.0, 0.0] {
-                    rows.extend((number as f32).to_le_bytes());
+            for [x, y, z, altitude, far] in part {
+                for number in [*x, *y, *z, *altitude, *far, 0.0, 0.0, 0.0] {
+                    rows.extend(number.to_le_bytes());
                 }
             }
             let exchange = Exchange::new(device, queue, &rows, 8 * part.len());
             let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
             let mut read = vec![entry(0, exchange.input.as_entire_binding())];
-            if let Some((tile, _)) = tile {
+            if let Some(tile) = &self.tile {
                 read.push(entry(1, wgpu::BindingResource::Sampler(&tile.sampler)));
                 read.push(entry(2, wgpu::BindingResource::TextureView(&tile.views[0])));
             }
@@ -177,7 +283,8 @@ pub fn layer_light(
                 read,
                 vec![entry(0, exchange.output.as_entire_binding())],
             ];
-            let groups: Vec<wgpu::BindGroup> = layouts
+            let groups: Vec<wgpu::BindGroup> = self
+                .layouts
                 .iter()
                 .zip(&bound)
                 .map(|(layout, entries)| {
@@ -190,17 +297,16 @@ pub fn layer_light(
                 .collect();
             let encoder = device.create_command_encoder(&Default::default());
             let workgroups = part.len().div_ceil(64) as u32;
-            let found = exchange.run(device, queue, encoder, pipeline, &groups, workgroups)?;
+            let found =
+                exchange.run(device, queue, encoder, &self.pipeline, &groups, workgroups)?;
             let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-            for (i, row) in part.iter().zip(found.chunks_exact(8)) {
-                light[*i] = CubeLight {
-                    scatter: options.sun * number(row),
-                    transmittance: number(&row[4..]),
-                };
-            }
+            light.extend(found.chunks_exact(8).map(|row| CubeLight {
+                scatter: number(row),
+                transmittance: number(&row[4..]),
+            }));
         }
+        Ok(light)
     }
-    Ok(light)
 }
 
 fn bake(gpu: &Gpu, tile: &Tile, deck: &CloudDeck, sun: [f32; 3]) {

@@ -5,15 +5,16 @@ mod deck;
 mod directions;
 mod layer_orders;
 mod layer_rays;
+mod order_table;
 mod phase;
 mod system;
 mod tile;
 pub mod volume;
 
 pub use air_lights::AirLights;
-pub use deck::CloudDeck;
-pub use layer_rays::{LayerOptions, layer_light};
-pub use system::{CloudLights, CloudQuality, Clouds, CloudsOptions};
+pub use deck::{CloudDeck, CloudShape, back_to_front};
+pub use layer_rays::{LayerOptions, layer_light, layer_shadow};
+pub use system::{CloudLights, CloudQuality, CloudShadow, Clouds, CloudsOptions};
 pub use tile::LOWEST_SUN;
 pub use volume::{CubeLight, CubeOptions, CubeRay, DensityCube, cube_light};
 

@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
+use super::order_table::{OrderTable, check_cells};
 use super::tile::{Tile, slant};
-use super::{CloudDeck, fault};
+use super::{AirLights, CloudDeck, Orders, fault};
 use crate::error::Error;
 use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
 use crate::program::{Pipeline, PipelineOptions, ProgramSet};
@@ -16,8 +17,10 @@ use crate::view::View;
 pub struct CloudLights {
     /// Irradiance of the sun on a plane across its direction at the clouds' altitude, behind the air; 0 when it has set there.
     pub sun: Vec3,
-    /// Mean radiance that comes to the clouds from sky and ground; they scatter it without shadows.
-    pub ambient: Vec3,
+    /// Mean radiance that comes from above to the layer's upper sphere, without the sun's own.
+    pub above: Vec3,
+    /// Mean radiance that comes from below to its lower sphere, of ground and air.
+    pub below: Vec3,
 }
 
 impl CloudLights {
@@ -25,7 +28,17 @@ impl CloudLights {
     pub fn clear(sun: Vec3) -> CloudLights {
         CloudLights {
             sun: sun * Vec3::new(1.0, 0.95, 0.88),
-            ambient: sun * Vec3::new(0.02, 0.028, 0.042),
+            above: sun * Vec3::new(0.02, 0.033, 0.059),
+            below: sun * Vec3::new(0.02, 0.023, 0.025),
+        }
+    }
+
+    /// Lights under an air, for a sun of this irradiance at the top of it.
+    pub fn under(air: &AirLights, sun: Vec3) -> CloudLights {
+        CloudLights {
+            sun: sun * air.sun,
+            above: sun * air.above,
+            below: sun * air.below,
         }
     }
 }
@@ -49,15 +62,17 @@ pub struct CloudQuality {
     pub second_tile: bool,
     /// Frames that a new tile takes while the first is shown, at least 1.
     pub frames: u32,
+    /// Cells along the edge of the table of light of all orders, a multiple of 32 in [32, 128], and along its height, in [2, 64].
+    pub cells: [u32; 2],
 }
 
 impl CloudQuality {
     /// That of a preset: `low`, `medium` and the rest.
     pub fn of(preset: &Preset) -> CloudQuality {
-        let (texels, first_texels, levels, steps) = match preset {
-            Preset::Low => (128, 64, 32, 24),
-            Preset::Medium => (192, 128, 64, 48),
-            _ => (384, 256, 64, 96),
+        let (texels, first_texels, levels, steps, cell_levels) = match preset {
+            Preset::Low => (128, 64, 32, 24, 8),
+            Preset::Medium => (192, 128, 64, 48, 8),
+            _ => (384, 192, 64, 96, 16),
         };
         CloudQuality {
             texels,
@@ -67,6 +82,7 @@ impl CloudQuality {
             min_transmittance: 1e-3,
             second_tile: true,
             frames: 30,
+            cells: [32, cell_levels],
         }
     }
 
@@ -98,7 +114,7 @@ impl CloudQuality {
                 "in [0, 0.1]",
             ));
         }
-        Ok(())
+        check_cells(self.cells)
     }
 }
 
@@ -113,21 +129,24 @@ pub struct CloudsOptions {
     pub far: f64,
     /// Whether the host's depth buffer hides clouds; [`Clouds::set_host`] tells it.
     pub over_depth: bool,
+    /// Which light: scattered once, with what comes from sky and ground scattered without shadows; or any number of times, of all three.
+    pub orders: Orders,
 }
 
 impl Default for CloudsOptions {
-    /// The layer of the preset `thesis` with the quality of `high`, to 80 km, without a depth buffer.
+    /// The layer of the preset `thesis` with the quality of `high`, to 80 km, without a depth buffer, light of all orders.
     fn default() -> Self {
         CloudsOptions {
             quality: CloudQuality::of(&Preset::High),
             deck: CloudDeck::default(),
             far: 80_000.0,
             over_depth: false,
+            orders: Orders::All,
         }
     }
 }
 
-/// Draws a layer of clouds, lit by single scattering, over a host's picture of scene radiance, from below, inside and above.
+/// Draws a layer of clouds, lit by light of all orders, over a host's picture of scene radiance, from below, inside and above.
 ///
 /// ```no_run
 /// # fn frame(device: &wgpu::Device, queue: &wgpu::Queue, encoder: &mut wgpu::CommandEncoder, target: &wgpu::TextureView)
@@ -156,6 +175,8 @@ pub struct Clouds {
     far: f64,
     depth: Depth,
     tile: Tile,
+    /// Light of many orders; none for single scattering.
+    orders: Option<OrderTable>,
     pipeline: wgpu::RenderPipeline,
     layouts: Vec<wgpu::BindGroupLayout>,
     view: wgpu::Buffer,
@@ -171,7 +192,22 @@ pub struct Clouds {
     coming: Option<(Vec3, u32)>,
     /// The sun of the last frame.
     last_sun: Option<Vec3>,
+    /// Whether the first tile was baked in this frame.
+    fresh: bool,
+    /// Fields of `CloudTile` for the last eye.
+    placed: Option<[f32; 10]>,
     seen: bool,
+}
+
+/// What a host's shader needs for the shadow of a layer: `cloud_shadow` of the module `veduta::clouds::tile`.
+#[derive(Debug, Clone, Copy)]
+pub struct CloudShadow<'a> {
+    /// The tile, `texture_3d<f32>`. Another one after some calls of [`Clouds::prepare`] while the sun moves: bind it anew then.
+    pub tile: &'a wgpu::TextureView,
+    /// Its sampler, which filters.
+    pub sampler: &'a wgpu::Sampler,
+    /// The fields of `CloudTile` in their order, for positions relative to the eye of the last [`Clouds::prepare`]; anew after each.
+    pub layer: [f32; 10],
 }
 
 impl Clouds {
@@ -235,12 +271,21 @@ impl Clouds {
         } else {
             (texels, quality.levels)
         };
-        let tile = Tile::new(device, programs, &texels, levels)?;
-        let features: &[&str] = if options.over_depth {
-            &["CLOUD_OVER_DEPTH"]
+        let tile = Tile::new(device, programs, &options.deck, &texels, levels)?;
+        let all = options.orders == Orders::All;
+        let orders = if all && !options.deck.is_empty() {
+            let table = OrderTable::new(device, programs, &options.deck, &tile, quality.cells)?;
+            Some(table)
         } else {
-            &[]
+            None
         };
+        let mut features = Vec::new();
+        if options.over_depth {
+            features.push("CLOUD_OVER_DEPTH");
+        }
+        if orders.is_some() {
+            features.push("CLOUD_ORDERS");
+        }
         let over = wgpu::BlendComponent {
             src_factor: wgpu::BlendFactor::One,
             dst_factor: wgpu::BlendFactor::SrcAlpha,
@@ -251,7 +296,7 @@ impl Clouds {
             dst_factor: wgpu::BlendFactor::SrcAlpha,
             operation: wgpu::BlendOperation::Add,
         };
-        let ready = programs.get("cloud_layer", features)?.pipeline(
+        let ready = programs.get("cloud_layer", &features)?.pipeline(
             device,
             &PipelineOptions {
                 targets: &[Some(wgpu::ColorTargetState {
@@ -291,10 +336,17 @@ impl Clouds {
         let view_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("veduta cloud view"),
             layout: &ready.bind_group_layouts[0],
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: view.as_entire_binding(),
-            }],
+            entries: &[
+                Some((0, &view)),
+                orders.as_ref().map(|table| (1, &table.weights)),
+            ]
+            .into_iter()
+            .flatten()
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect::<Vec<_>>(),
         });
         let mut clouds = Clouds {
             deck: options.deck.clone(),
@@ -302,6 +354,7 @@ impl Clouds {
             far: options.far,
             depth: targets.depth,
             tile,
+            orders,
             pipeline,
             layouts: ready.bind_group_layouts,
             view,
@@ -313,6 +366,8 @@ impl Clouds {
             shown: None,
             coming: None,
             last_sun: None,
+            fresh: false,
+            placed: None,
             seen: true,
         };
         if !options.over_depth {
@@ -341,6 +396,12 @@ impl Clouds {
                     entries.push(wgpu::BindGroupEntry {
                         binding: 2,
                         resource: wgpu::BindingResource::TextureView(depth),
+                    });
+                }
+                if let Some(table) = &self.orders {
+                    entries.push(wgpu::BindGroupEntry {
+                        binding: 3,
+                        resource: wgpu::BindingResource::TextureView(&table.view),
                     });
                 }
                 device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -373,6 +434,17 @@ impl Clouds {
         Ok(())
     }
 
+    /// What hosts need to shade their own things; none before the first [`Clouds::prepare`] of a view that can show the layer, and for a layer without clouds, whose
+    /// shadow is 1 everywhere. Straight light alone: what the clouds scatter down is not in it.
+    pub fn shadow(&self) -> Option<CloudShadow<'_>> {
+        let (shown, _) = self.shown?;
+        Some(CloudShadow {
+            tile: &self.tile.views[shown],
+            sampler: &self.tile.sampler,
+            layer: self.placed?,
+        })
+    }
+
     /// The layer.
     pub fn deck(&self) -> &CloudDeck {
         &self.deck
@@ -381,14 +453,22 @@ impl Clouds {
     /// What it keeps on the device.
     pub fn resources(&self) -> Resources {
         let parts = self.tile.slots();
+        let tiles = self.groups.len() as u32;
+        let orders = self.orders.as_ref().map(OrderTable::holds);
+        let (textures, bytes, buffers, groups) = orders.unwrap_or_default();
+        let more = u32::from(orders.is_some());
         Resources {
-            pipelines: 2,
-            bind_groups: parts + 2 + self.groups.len() as u32,
-            bindings: parts + 2 + (2 + u32::from(self.over_depth)) * self.groups.len() as u32,
-            buffers: parts + 2,
-            buffer_bytes: self.tile.buffer_bytes() + DrawBlock::SIZE as u64,
-            textures: self.tile.views.len() as u32,
-            texture_bytes: self.tile.texture_bytes(),
+            pipelines: 2 + 5 * more,
+            bind_groups: parts + 2 + tiles + groups,
+            bindings: parts
+                + 2
+                + more
+                + (2 + more + u32::from(self.over_depth)) * tiles
+                + 2 * groups,
+            buffers: parts + 2 + buffers,
+            buffer_bytes: self.tile.buffer_bytes() + DrawBlock::SIZE as u64 + bytes,
+            textures: self.tile.views.len() as u32 + more,
+            texture_bytes: self.tile.texture_bytes() + textures,
             samplers: 1,
         }
     }
@@ -408,7 +488,8 @@ impl Clouds {
         view.check()?;
         for (name, light) in [
             ("lights.sun", lights.sun),
-            ("lights.ambient", lights.ambient),
+            ("lights.above", lights.above),
+            ("lights.below", lights.below),
         ] {
             if !(light.is_finite() && light.min_element() >= 0.0) {
                 return Err(fault(name, light, "finite and at least 0"));
@@ -430,7 +511,19 @@ impl Clouds {
             return Ok(work);
         }
         let to_sun = view.sun.to_light.normalize_or(Vec3::Y);
-        self.bake(queue, encoder, to_sun, &mut work);
+        let before = self.shown;
+        if lights.sun.max_element() > 0.0 || self.shown.is_none() {
+            self.bake(queue, encoder, to_sun, &mut work);
+        } else {
+            // At night no tile is needed for where the sun goes.
+            (self.last_sun, self.fresh) = (None, false);
+        }
+        if let (Some(table), Some((shown, sun))) = (&mut self.orders, self.shown) {
+            let fresh = self.fresh;
+            let swapped = before.is_some_and(|b| b.0 != shown);
+            let baked = (shown, sun.to_array());
+            table.advance(queue, encoder, baked, fresh, swapped, &mut work);
+        }
         let sun = self.shown.map_or(to_sun, |s| s.1);
         let deck = &self.deck;
         let period = deck.period();
@@ -440,7 +533,15 @@ impl Clouds {
             (deck.wind[1] * view.time).rem_euclid(period),
         ));
         let place = |axis| -> Result<f32, Error> { Ok(moved.lattice(axis, period)?.frac) };
-        let albedo = deck.albedo as f32;
+        // What scatters once takes the light around for even.
+        let (albedo, above, below) = match &self.orders {
+            Some(_) => (1.0, lights.above, lights.below),
+            None => {
+                let albedo = deck.albedo as f32;
+                let around = 0.5 * albedo * (lights.above + lights.below);
+                (albedo, around, around)
+            }
+        };
         let block = DrawBlock {
             ray_middle: middle.to_array(),
             eye_altitude: eye.altitude() as f32,
@@ -458,10 +559,12 @@ impl Clouds {
             depth_offset: scale,
             sun_light: (albedo * lights.sun).to_array(),
             min_transmittance: self.quality.min_transmittance,
-            ambient: (albedo * lights.ambient).to_array(),
+            above: above.to_array(),
+            below: below.to_array(),
+            kept: self.orders.as_ref().map_or(1.0, |table| table.kept),
             extinction: deck.extinction as f32,
             place: [place(0)?, place(2)?],
-            shear: slant(sun.to_array()).0,
+            shear: slant(sun.to_array(), deck.lowest_sun(self.tile.levels)).0,
             tiles_per_metre: (1.0 / period) as f32,
             bottom: deck.bottom as f32,
             thickness: deck.thickness as f32,
@@ -477,6 +580,18 @@ impl Clouds {
             clear: deck.clear_way() as f32,
             ..Default::default()
         };
+        self.placed = Some([
+            block.place[0],
+            block.place[1],
+            block.shear[0],
+            block.shear[1],
+            block.tiles_per_metre,
+            block.bottom,
+            block.thickness,
+            block.levels,
+            block.extinction,
+            block.clear,
+        ]);
         let bytes = block.to_bytes().to_vec();
         if bytes != self.held {
             queue.write_buffer(&self.view, 0, &bytes);
@@ -495,6 +610,7 @@ impl Clouds {
         to_sun: Vec3,
         work: &mut Work,
     ) {
+        self.fresh = false;
         let step = self.last_sun.map_or(Vec3::ZERO, |last| to_sun - last);
         self.last_sun = Some(to_sun);
         // A sun that jumps by more than ten degrees is begun anew.
@@ -512,6 +628,7 @@ impl Clouds {
             }
             work.bakes += 1;
             self.shown = Some((0, to_sun));
+            self.fresh = true;
             return;
         };
         let other = match (shown, self.tile.views.len()) {

@@ -7,7 +7,7 @@ use crate::landscape::Work;
 use crate::program::ProgramSet;
 use crate::programs::blocks::TileRows as RowsBlock;
 
-/// Sine of the lowest height of the sun that a tile is baked for; for a lower sun that of 7 degrees takes its place.
+/// Sine of the lowest height of the sun that any tile is baked for; for a lower sun that of 7 degrees takes its place. [`CloudDeck::lowest_sun`] is that of a layer.
 pub const LOWEST_SUN: f32 = 0.121_869;
 
 /// Rows that are baked at once: what the buffer between program and texture holds.
@@ -29,9 +29,9 @@ pub(super) struct Tile {
 }
 
 /// Horizontal way of the sun's ray per metre of height, and its whole way.
-pub(super) fn slant(to_sun: [f32; 3]) -> ([f32; 2], f32) {
+pub(super) fn slant(to_sun: [f32; 3], lowest: f32) -> ([f32; 2], f32) {
     let [x, y, z] = to_sun;
-    let rise = y.max(LOWEST_SUN);
+    let rise = y.max(lowest);
     let across = (x * x + z * z).sqrt();
     // The same length whatever the rise.
     let level = (1.0 - rise * rise).max(0.0).sqrt() / across.max(1e-12);
@@ -42,11 +42,12 @@ impl Tile {
     pub fn new(
         device: &wgpu::Device,
         programs: &ProgramSet,
+        deck: &CloudDeck,
         texels: &[u32],
         levels: u32,
     ) -> Result<Tile, Error> {
         let most = texels.iter().copied().max().unwrap_or(64);
-        let (pipeline, layouts) = compute(device, programs, "cloud_tile", &[], &[])?;
+        let (pipeline, layouts) = compute(device, programs, "cloud_tile", deck.flags(), &[])?;
         let textures: Vec<wgpu::Texture> = texels
             .iter()
             .map(|&texels| {
@@ -148,10 +149,11 @@ impl Tile {
         texture: usize,
         part: u32,
     ) -> Work {
-        let (shear, slant) = slant(to_sun);
+        let (shear, slant) = slant(to_sun, deck.lowest_sun(self.levels));
         let texels = self.texels[texture];
         let first = part * ROWS;
         let rows = ROWS.min(texels - first);
+        let shape = deck.shape.clone().unwrap_or_default();
         let block = RowsBlock {
             shear,
             edge: deck.period() as f32,
@@ -168,6 +170,12 @@ impl Tile {
             uniformity: deck.uniformity as f32,
             extinction: deck.extinction as f32,
             seed: deck.seed,
+            kind: shape.kind as f32,
+            kind_spread: shape.kind_spread as f32,
+            coverage_spread: shape.coverage_spread as f32,
+            detail: shape.detail as f32,
+            sharpness: shape.sharpness as f32,
+            weather_doublings: shape.weather_doublings,
         };
         let (uniform, bound) = &self.slots[part as usize];
         let bytes = block.to_bytes();

@@ -299,6 +299,7 @@ impl<'a> Solver<'a> {
             step: step as f32,
             step_depth: if textbook { 0.1 } else { 1.0 },
             all_orders: i32::from(options.orders == Orders::All),
+            gain: 1.0,
             ..Default::default()
         };
         let kernel = |flags: &[&str]| compute(device, programs, "cloud_volume", flags, &[]);
@@ -333,7 +334,7 @@ impl<'a> Solver<'a> {
                 .map(|(binding, buffer)| (*binding, buffer.as_entire_binding()))
                 .collect()
         }
-        groups(self.gpu, kernel, &bound.map(whole))
+        groups(&self.gpu.device, kernel, &bound.map(whole))
     }
 
     fn prepare(&self, to_sun: [f64; 3]) -> Result<Prepared, Error> {
@@ -383,6 +384,7 @@ impl<'a> Solver<'a> {
             let cells = storage(8 * count);
             let source = storage(4 * 24 * count);
             let moments = storage(64 * count);
+            let last = storage(64 * count);
             let radiance = storage(4 * 24 * count);
             let (ways, _) = self.ways(edge);
             let mut encoder = device.create_command_encoder(&Default::default());
@@ -395,16 +397,16 @@ impl<'a> Solver<'a> {
             dispatch(&mut encoder, &self.fill, &groups, count.div_ceil(64));
             let gathered = |kernel: &Kernel, place: u32, from: &wgpu::Buffer| {
                 let bound: [&[_]; 3] = [
-                    &[(0, &uniform)],
-                    &[(2, &ways), (3, &cells), (place, from)],
-                    &[(3, &source), (4, &moments)],
+                    &[(0, &uniform), (1, &ways)],
+                    &[(3, &cells), (place, from)],
+                    &[(3, &source), (4, &moments), (8, &last)],
                 ];
                 self.groups(kernel, bound)
             };
             let gather = gathered(&self.gather, 5, &radiance);
             let bound: [&[_]; 3] = [
-                &[(0, &uniform)],
-                &[(2, &ways), (3, &cells), (4, &source)],
+                &[(0, &uniform), (1, &ways)],
+                &[(3, &cells), (4, &source)],
                 &[(2, &radiance)],
             ];
             let sweep = self.groups(&self.sweep, bound);
@@ -523,7 +525,7 @@ pub(super) fn uniform_of(gpu: &Gpu, block: &GridBlock) -> wgpu::Buffer {
 
 /// The groups of a kernel, from what is bound in each by number.
 pub(super) fn groups(
-    gpu: &Gpu,
+    device: &wgpu::Device,
     kernel: &Kernel,
     bound: &[Vec<(u32, wgpu::BindingResource<'_>)>; 3],
 ) -> Vec<wgpu::BindGroup> {
@@ -535,7 +537,7 @@ pub(super) fn groups(
                 resource: resource.clone(),
             })
             .collect();
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("veduta cloud light"),
             layout,
             entries: &entries,
@@ -559,7 +561,8 @@ pub(super) fn dispatch(
 }
 
 pub(super) fn filled(gpu: &Gpu, bytes: &[u8]) -> wgpu::Buffer {
-    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+    use wgpu::BufferUsages as Usage;
+    let usage = Usage::STORAGE | Usage::UNIFORM | Usage::COPY_DST;
     let buffer = room(&gpu.device, bytes.len(), usage);
     gpu.queue.write_buffer(&buffer, 0, bytes);
     buffer

@@ -2,6 +2,9 @@
 
 use super::fractal::fbm_value_3d_periodic;
 use super::math::{add, dot, scale};
+use super::noise::{
+    gradient_noise_2d_periodic, gradient_noise_3d_periodic, octave_seed, worley::cell_point_3d,
+};
 use super::phase::phase_double_henyey_greenstein;
 use super::planet::{
     altitude_along, altitude_of, clip_segment, direction_cosine_along, ground_distance,
@@ -76,6 +79,99 @@ pub fn uncut_density(layer: &CloudLayer, relative: [f64; 3], altitude: f64) -> f
     let n = noise(layer, relative, altitude);
     let filled = n + (1.0 - n) * layer.uniformity;
     (filled - (1.0 - layer.coverage)) / layer.coverage.max(1e-6)
+}
+
+/// What forms the clouds of a layer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CloudShape {
+    /// 0 stratus, 1/2 cumulus, 1 cumulonimbus.
+    pub kind: f64,
+    /// What the weather adds to the kind.
+    pub kind_spread: f64,
+    /// What the weather adds to the coverage.
+    pub coverage_spread: f64,
+    /// How far finer billows fray the edges.
+    pub detail: f64,
+    /// Density over what the noise exceeds its threshold by.
+    pub sharpness: f64,
+    /// The weather has 2 to this power cells over the period.
+    pub weather_doublings: u32,
+}
+
+/// A place on a torus as a cell and a fraction, where the torus has 2^bits cells an axis; `place` is in turns.
+fn torus_place<const N: usize>(place: [f64; N], bits: u32) -> ([i32; N], [f64; N]) {
+    let count = f64::from(bits).exp2();
+    let at = place.map(|p| (p - p.floor()) * count);
+    (at.map(|a| a.floor() as i32), at.map(|a| a - a.floor()))
+}
+
+/// Billows on a torus of 2^bits cells: 1 at scattered points in the middle half of cells, falling evenly to 0 at three quarters of a cell from them.
+pub fn billows(place: [f64; 3], bits: u32, seed: u32) -> f64 {
+    let (cell, frac) = torus_place(place, bits);
+    let mask = (1 << bits) - 1;
+    let mut nearest = f64::INFINITY;
+    // All cells about: those beyond the eight of the device have no point within reach.
+    for k in 0..27 {
+        let offset = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
+        let near: [i32; 3] = std::array::from_fn(|a| (cell[a] + offset[a]) & mask);
+        let point = cell_point_3d(near, seed);
+        let square: f64 = (0..3)
+            .map(|a| (frac[a] - f64::from(offset[a]) - 0.25 - 0.5 * point[a]).powi(2))
+            .sum();
+        nearest = nearest.min(square);
+    }
+    1.0 - (nearest.sqrt() / 0.75).min(1.0)
+}
+
+fn smooth_rise(x: f64) -> f64 {
+    let t = x.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// How much cloud a kind has at a share `height` of the layer.
+pub fn kind_profile(kind: f64, height: f64) -> f64 {
+    let wane = 0.08 + kind * (0.34 + 0.3 * kind);
+    let end = 0.22 + kind * (0.8 - 0.02 * kind);
+    smooth_rise(height / (0.05 + 0.05 * kind)) * (1.0 - smooth_rise((height - wane) / (end - wane)))
+}
+
+/// Density before its cut of a layer with forms.
+pub fn shaped_density(
+    layer: &CloudLayer,
+    shape: &CloudShape,
+    relative: [f64; 3],
+    altitude: f64,
+) -> f64 {
+    let period = f64::from(layer.period);
+    let cells = scale([relative[0], altitude, relative[2]], 1.0 / layer.wavelength);
+    let place: [f64; 3] =
+        std::array::from_fn(|k| (f64::from(layer.cell[k]) + layer.frac[k] + cells[k]) / period);
+    let bits = layer.period.ilog2();
+    let seed = |i: i32| octave_seed(layer.seed, i);
+    let flat = |bits: u32, seed: u32| {
+        let (cell, frac) = torus_place([place[0], place[2]], bits);
+        gradient_noise_2d_periodic(cell, frac, [1 << bits; 2], seed)
+    };
+    let swelling = |bits: u32, seed: u32| {
+        let (cell, frac) = torus_place(place, bits);
+        gradient_noise_3d_periodic(cell, frac, [1 << bits; 3], seed)
+    };
+    let wide = shape.weather_doublings;
+    let height = ((altitude - layer.bottom) / layer.thickness.max(1e-3)).clamp(0.0, 1.0);
+    let fronts = flat(wide, seed(8)) + 0.5 * flat(wide + 1, seed(9));
+    let cover = (layer.coverage + shape.coverage_spread * fronts).clamp(0.0, 1.0);
+    let kind = (shape.kind + shape.kind_spread * flat(wide, seed(10))).clamp(0.0, 1.0);
+    let heap = 0.6 * billows(place, bits, seed(1))
+        + 0.28 * billows(place, bits + 1, seed(2))
+        + 0.12 * billows(place, bits + 2, seed(3));
+    let swell = swelling(bits, seed(4)) + 0.5 * swelling(bits + 1, seed(5));
+    let base = (0.175 + 0.21 * swell + 0.8125 * heap).clamp(0.0, 1.0);
+    let base = base + (1.0 - base) * layer.uniformity;
+    let whole = shape.sharpness * (base + cover * kind_profile(kind, height) - 1.0);
+    let fine = 0.65 * billows(place, bits + 3, seed(6)) + 0.35 * billows(place, bits + 4, seed(7));
+    let above = (8.0 * height).clamp(0.0, 1.0);
+    let frayed = fine + (1.0 - 2.0 * fine) * above;
+    whole - 0.35 * shape.detail * shape.sharpness * frayed * (1.0 - whole.clamp(0.0, 1.0))
 }
 
 /// Mean of a density that changes evenly from one value to another, where what is below 0 is none.

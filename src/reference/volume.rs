@@ -495,7 +495,7 @@ pub fn cube_light(
 }
 
 /// The light of a layer alone along rays of the sky's kind, on all cores: radiance, its error (one standard error for all orders) and transmittance. Single
-/// scattering is found to about 1e-4.
+/// scattering is found to about 1e-4; in clouds with forms by paths that end at it, with their standard error.
 pub fn layer_light(
     deck: &CloudDeck,
     rays: &[ProbeRay],
@@ -523,6 +523,14 @@ pub fn layer_light(
         backward_share: deck.backward_share,
         seed: deck.seed,
     };
+    let shape = deck.shape.as_ref().map(|s| super::clouds::CloudShape {
+        kind: s.kind,
+        kind_spread: s.kind_spread,
+        coverage_spread: s.coverage_spread,
+        detail: s.detail,
+        sharpness: s.sharpness,
+        weather_doublings: s.weather_doublings,
+    });
     let top = deck.bottom + deck.thickness;
     let region = Region::Shell {
         ground_radius: deck.planet_radius,
@@ -533,7 +541,13 @@ pub fn layer_light(
         region,
         density: |p: [f64; 3]| {
             let altitude = region.altitude(p).clamp(deck.bottom, top);
-            super::clouds::cloud_density(&layer, [p[0], 0.0, p[2]], altitude)
+            let across = [p[0], 0.0, p[2]];
+            match &shape {
+                Some(shape) => {
+                    super::clouds::shaped_density(&layer, shape, across, altitude).clamp(0.0, 1.0)
+                }
+                None => super::clouds::cloud_density(&layer, across, altitude),
+            }
         },
         max_density: 1.0 + 1e-12,
         extinction: deck.extinction,
@@ -549,7 +563,7 @@ pub fn layer_light(
             to_sun: rays[i].to_sun,
             distance: rays[i].distance,
         };
-        if orders == Orders::Single {
+        if orders == Orders::Single && shape.is_none() {
             let once = volume.single_scatter(&ray, 1e-4);
             return [
                 once.scatter * paths.sun,
@@ -557,16 +571,38 @@ pub fn layer_light(
                 once.transmittance,
             ];
         }
+        // So short that no cloud lies between the points of the first rule.
+        let pieces: Vec<(f64, f64)> = volume
+            .region
+            .stretches(ray.origin, ray.dir, ray.distance)
+            .into_iter()
+            .flat_map(|(from, to)| {
+                let count = ((to - from) / (0.125 * deck.wavelength))
+                    .ceil()
+                    .clamp(1.0, 1e4);
+                let edge = move |k: f64| from + (to - from) * k / count;
+                (0..count as i32).map(move |k| (edge(f64::from(k)), edge(f64::from(k + 1))))
+            })
+            .collect();
         let depth = integrate_kronrod(
             |t| [volume.extinction_at(add(ray.origin, scale(ray.dir, t)))],
-            &volume.region.stretches(ray.origin, ray.dir, ray.distance),
+            &pieces,
             Tolerance {
                 relative: 1e-5,
                 absolute: 1e-5,
-                panels: 2000,
+                panels: 2000 + pieces.len(),
             },
         );
-        let (mean, error) = volume.trace(&ray, paths, i as u64);
+        let once = VolumePaths {
+            max_order: paths.max_order.min(1),
+            ..*paths
+        };
+        let counted = if orders == Orders::Single {
+            &once
+        } else {
+            paths
+        };
+        let (mean, error) = volume.trace(&ray, counted, i as u64);
         [mean, error, (-depth.value[0]).exp()]
     })
 }

@@ -533,6 +533,93 @@ fn cloud_functions_keep_their_promised_error() {
 }
 
 #[test]
+fn clouds_with_forms_keep_their_promised_error_and_repeat() {
+    let model = layer(f64::from(0.6_f32), 0.0, f64::from(0.06_f32), 0.5);
+    let shape = clouds::CloudShape {
+        kind: 0.5,
+        kind_spread: 0.25,
+        coverage_spread: 0.5,
+        detail: 0.5,
+        sharpness: 4.0,
+        weather_doublings: 2,
+    };
+    let (device_rows, list) = rows(5000, 35, |r| {
+        [
+            r.between(-8e4, 8e4),
+            0.0,
+            r.between(-8e4, 8e4),
+            r.between(4000.0, 5500.0),
+            r.unit(),
+            r.unit(),
+        ]
+    });
+    let values = evaluator(
+        &[
+            "veduta::clouds::field::{CloudLayer}",
+            "veduta::clouds::shape::{CloudShape, shaped_density}",
+        ],
+        LAYER,
+        "shaped_density(layer(0.6, 0.0, 0.06, 0.5), CloudShape(0.5, 0.25, 0.5, 0.5, 4.0, 2u), vec3f(in.f[0], in.f[1], in.f[2]), in.f[3])",
+        6,
+    )
+    .run(&device_rows)
+    .unwrap();
+    let truth: Vec<f64> = list
+        .iter()
+        .map(|r| clouds::shaped_density(&model, &shape, [r[0], r[1], r[2]], r[3]))
+        .collect();
+    assert_promise("clouds/shape", "shaped_density", &values, &truth);
+    let cloudy = truth.iter().filter(|d| **d > 0.0).count();
+    assert!((500..4500).contains(&cloudy), "{cloudy}");
+    // A period of four wavelengths.
+    for (r, d) in list.iter().zip(&truth).take(500) {
+        let next = clouds::shaped_density(
+            &model,
+            &shape,
+            [r[0] + 16_000.0, r[1], r[2] - 32_000.0],
+            r[3],
+        );
+        assert!((next - d).abs() < 1e-6, "{next} {d}");
+    }
+    let values = evaluator(
+        &["veduta::clouds::shape::{kind_profile}"],
+        "",
+        "kind_profile(in.f[4], in.f[5])",
+        6,
+    )
+    .run(&device_rows)
+    .unwrap();
+    let truth: Vec<f64> = list
+        .iter()
+        .map(|r| clouds::kind_profile(r[4], r[5]))
+        .collect();
+    assert_promise("clouds/shape", "kind_profile", &values, &truth);
+    let turns: Vec<u32> = device_rows
+        .chunks(6)
+        .flat_map(|r| {
+            [
+                r[0].wrapping_mul(2_654_435_761),
+                r[2].wrapping_mul(747_796_405),
+                r[3].wrapping_mul(2_246_822_519),
+            ]
+        })
+        .collect();
+    let values = evaluator(
+        &["veduta::clouds::shape::{billows}"],
+        "",
+        "billows(vec3u(in.u[0], in.u[1], in.u[2]), 3u, 7u)",
+        3,
+    )
+    .run(&turns)
+    .unwrap();
+    let truth: Vec<f64> = turns
+        .chunks(3)
+        .map(|t| clouds::billows([0, 1, 2].map(|k| f64::from(t[k]) * 0.5_f64.powi(32)), 3, 7))
+        .collect();
+    assert_promise("clouds/shape", "billows", &values, &truth);
+}
+
+#[test]
 fn the_cloud_march_keeps_its_promised_error_and_its_counts() {
     let mut random = Random(33);
     let list: Vec<Ray> = (0..400)

@@ -4,9 +4,9 @@ use crate::common::gpu;
 use veduta::atmosphere::ProbeRay;
 use veduta::clouds::{
     CloudDeck, CloudLights, CloudQuality, Clouds, CloudsOptions, CubeOptions, CubeRay, DensityCube,
-    LayerOptions, Orders, ProbePath, cube_light, layer_light,
+    LayerOptions, Orders, ProbePath, back_to_front, cube_light, layer_light, layer_shadow,
 };
-use veduta::glam::{DVec3, Vec3};
+use veduta::glam::{DVec3, Quat, Vec3};
 use veduta::reference::monte_carlo::Random;
 use veduta::reference::phase::phase_henyey_greenstein;
 use veduta::reference::volume::{self, VolumePaths};
@@ -499,6 +499,194 @@ fn clouds_with_wind_and_a_moved_eye_meet_the_query() {
     );
 }
 
+/// The marches through clouds with forms, and their tile, meet quadrature.
+#[test]
+fn clouds_with_forms_meet_quadrature() {
+    let deck = CloudDeck::named("fair").unwrap();
+    let to_sun = direction(0.8, 1.0).to_array();
+    let rays: Vec<ProbeRay> = layer_rays(to_sun)
+        .into_iter()
+        .map(|r| ProbeRay {
+            altitude: if r.altitude > 4000.0 && r.altitude < 6000.0 {
+                1500.0
+            } else {
+                r.altitude
+            },
+            ..r
+        })
+        .step_by(2)
+        .collect();
+    // Paths that end at the first scattering; the transmittance is by quadrature.
+    let paths = VolumePaths {
+        samples: 600,
+        max_order: 1,
+        ..Default::default()
+    };
+    let truth = volume::layer_light(&deck, &rays, Orders::All, &paths);
+    let root = |of: &dyn Fn(usize) -> f64| {
+        ((0..truth.len()).map(|k| of(k).powi(2)).sum::<f64>() / truth.len() as f64).sqrt()
+    };
+    let (rms, noise) = (root(&|k| truth[k][0]), root(&|k| truth[k][1]));
+    for (path, worst, clear) in [
+        (ProbePath::Textbook, 0.02, 0.01),
+        (ProbePath::Fast, 0.2, 0.05),
+    ] {
+        let options = LayerOptions {
+            path,
+            orders: Orders::Single,
+            ..Default::default()
+        };
+        let found = layer_light(gpu(), veduta::programs(), &deck, &rays, &options).unwrap();
+        let off = root(&|k| f64::from(found[k].scatter) - truth[k][0]) / rms;
+        let through = root(&|k| f64::from(found[k].transmittance) - truth[k][2]);
+        println!(
+            "{path:?}: {off:.4} of the root mean square (noise {:.4}), transmittance {through:.4}",
+            noise / rms
+        );
+        assert!(
+            off < (worst * worst + (2.0 * noise / rms).powi(2)).sqrt(),
+            "{path:?} {off}"
+        );
+        if through >= clear {
+            for (k, ray) in rays.iter().enumerate() {
+                println!("{ray:?} {:?} {:?}", found[k], truth[k]);
+            }
+        }
+        assert!(through < clear, "{path:?} {through}");
+    }
+    let covered = truth.iter().filter(|t| t[2] < 0.5).count();
+    assert!((4..truth.len() - 2).contains(&covered), "{covered}");
+}
+
+/// Judges `cloud_shadow`: points on the ground, between, within and above, against the depth along the ray to the sun.
+#[test]
+fn shadows_of_clouds_meet_the_reference() {
+    use veduta::reference::clouds as exact;
+    let deck = CloudDeck::default();
+    let layer = exact::CloudLayer {
+        cell: [0; 3],
+        frac: [0.0; 3],
+        wavelength: deck.wavelength,
+        period: 1 << deck.period_doublings,
+        octaves: 6,
+        hurst: 1.0,
+        bottom: deck.bottom,
+        thickness: deck.thickness,
+        coverage: deck.coverage,
+        uniformity: deck.uniformity,
+        extinction: deck.extinction,
+        albedo: deck.albedo,
+        g_forward: deck.g_forward,
+        g_backward: deck.g_backward,
+        backward_share: deck.backward_share,
+        seed: deck.seed,
+    };
+    let to_sun = direction(0.8, 1.0).to_array();
+    let mut random = Random::new(8, 3);
+    let points: Vec<[f64; 3]> = (0..400)
+        .map(|k| {
+            let altitude = [0.0, 1500.0, 4600.0, 7000.0][k % 4];
+            let across = |random: &mut Random| 3e4 * (random.unit() - 0.5);
+            [across(&mut random), altitude, across(&mut random)]
+        })
+        .collect();
+    let found = layer_shadow(gpu(), veduta::programs(), &deck, to_sun, &points).unwrap();
+    let (mut square, mut shaded) = (0.0, 0);
+    for ([x, y, z], found) in points.iter().zip(&found) {
+        let wanted = if *y > 5500.0 {
+            1.0
+        } else {
+            // The layer is plane over so little a way.
+            let up = (deck.bottom - y).max(0.0);
+            let [sx, sy, sz] = to_sun;
+            let at = [x + up * sx / sy, 0.0, z + up * sz / sy];
+            let altitude = y.max(deck.bottom);
+            (-exact::sun_depth(&layer, 1e9, at, altitude, to_sun, sy, 600)).exp()
+        };
+        if *y > 5500.0 {
+            assert_eq!(*found, 1.0);
+        }
+        square += (f64::from(*found) - wanted).powi(2);
+        shaded += usize::from(wanted < 0.1);
+    }
+    let off = (square / points.len() as f64).sqrt();
+    println!(
+        "shadows off by {off:.4}, {shaded} of {} in shade",
+        points.len()
+    );
+    assert!(off < 0.03, "{off}");
+    assert!((40..280).contains(&shaded), "{shaded}");
+}
+
+/// Two layers over one picture, for eyes below, between and above: each lies before the one behind it.
+#[test]
+fn two_layers_lie_in_the_right_order() {
+    let host = Host::new();
+    let low = CloudDeck {
+        bottom: 1500.0,
+        thickness: 800.0,
+        seed: 9,
+        extinction: 0.004,
+        wind: [10.0, 0.0],
+        ..CloudDeck::default()
+    };
+    let high = CloudDeck {
+        bottom: 6000.0,
+        extinction: 0.002,
+        wind: [-30.0, 5.0],
+        ..CloudDeck::default()
+    };
+    let decks = [&high, &low];
+    for (altitude, pitch, first) in [
+        (300.0, 0.7, 0),
+        (4000.0, 0.5, 0),
+        (4000.0, -0.5, 0),
+        (12_000.0, -0.7, 1),
+    ] {
+        let mut view = looking(altitude, pitch);
+        view.time = 1000.0;
+        let order = back_to_front(altitude, &decks).unwrap();
+        assert_eq!(order[0], first);
+        let mut alone = Vec::new();
+        let mut both: Vec<Clouds> = Vec::new();
+        for deck in decks {
+            let options = CloudsOptions {
+                deck: deck.clone(),
+                ..small()
+            };
+            let new = || {
+                Clouds::new(
+                    &gpu().device,
+                    veduta::programs(),
+                    &Host::targets(),
+                    &options,
+                )
+                .unwrap()
+            };
+            alone.push(host.frame(&mut new(), &view).2);
+            both.push(new());
+        }
+        let words = host.layers(&mut both, &order, &view);
+        let [back, front] = [&alone[order[0]], &alone[order[1]]];
+        let (mut through, mut swapped) = (0.0_f32, 0.0_f32);
+        for (k, pixel) in words.chunks(4).enumerate() {
+            let at = |list: &[u16], c: usize| half(list[4 * k + c]);
+            let wanted = at(front, 0) + at(front, 3) * at(back, 0);
+            let wrong = at(back, 0) + at(back, 3) * at(front, 0);
+            let found = half(pixel[0]);
+            assert!(
+                (found - wanted).abs() < 2e-3 * (1.0 + wanted),
+                "{found} {wanted}"
+            );
+            through = through.max((half(pixel[3]) - at(front, 3) * at(back, 3)).abs());
+            swapped = swapped.max((wrong - wanted).abs());
+        }
+        assert!(through < 2e-3, "{through}");
+        // Only rays through both tell the order.
+        assert!(altitude == 4000.0 || swapped > 0.01, "{altitude} {swapped}");
+    }
+}
+
 /// A depth buffer's wall before the clouds hides them, one behind does not, and one within cuts them.
 #[test]
 fn a_host_s_depth_ends_the_march() {
@@ -615,11 +803,56 @@ impl Host {
 
     /// Work of a frame over black, and the 16-bit words of the picture.
     fn frame(&self, clouds: &mut Clouds, view: &View) -> (veduta::Work, veduta::Work, Vec<u16>) {
+        self.lit_frame(clouds, view, &CloudLights::clear(view.sun.irradiance))
+    }
+
+    /// Several layers over black, in an order.
+    fn layers(&self, layers: &mut [Clouds], order: &[usize], view: &View) -> Vec<u16> {
         let gpu = gpu();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let lights = CloudLights::clear(view.sun.irradiance);
+        for layer in layers.iter_mut() {
+            let _ = layer
+                .prepare(&gpu.queue, &mut encoder, view, &lights)
+                .unwrap();
+        }
+        let target = self.texture.create_view(&Default::default());
+        {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &target,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                ..Default::default()
+            });
+            for k in order {
+                let _ = layers[*k].composite(&mut pass).unwrap();
+            }
+        }
+        gpu.queue.submit([encoder.finish()]);
+        let bytes = gpu.read_texture(&self.texture).unwrap();
+        bytes
+            .chunks_exact(2)
+            .map(|b| u16::from_le_bytes([b[0], b[1]]))
+            .collect()
+    }
+
+    /// The same under other lights.
+    fn lit_frame(
+        &self,
+        clouds: &mut Clouds,
+        view: &View,
+        lights: &CloudLights,
+    ) -> (veduta::Work, veduta::Work, Vec<u16>) {
+        let gpu = gpu();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let prepared = clouds
-            .prepare(&gpu.queue, &mut encoder, view, &lights)
+            .prepare(&gpu.queue, &mut encoder, view, lights)
             .unwrap();
         let target = self.texture.create_view(&Default::default());
         let drawn = {
@@ -655,6 +888,7 @@ fn small() -> CloudsOptions {
             levels: 16,
             steps: 16,
             frames: 2,
+            cells: [32, 2],
             ..CloudQuality::of(&Preset::Low)
         },
         ..Default::default()
@@ -688,7 +922,10 @@ fn clouds_that_cannot_be_seen_are_no_work() {
         assert_eq!((prepared, drawn), (idle, idle));
         assert!(words.chunks(4).all(|p| p == [0, 0, 0, 0x3c00]));
     }
-    let mut clouds = new(&small());
+    let mut clouds = new(&CloudsOptions {
+        orders: Orders::Single,
+        ..small()
+    });
     for view in [looking(300.0, -1.2), looking(20_000.0, 0.8)] {
         let (prepared, drawn, _) = host.frame(&mut clouds, &view);
         assert_eq!((prepared, drawn), (idle, idle));
@@ -712,6 +949,162 @@ fn clouds_that_cannot_be_seen_are_no_work() {
     view.sun.to_light = (view.sun.to_light * 0.0 + Vec3::new(0.866, 0.505, 0.0)).normalize();
     let (prepared, ..) = host.frame(&mut clouds, &view);
     assert_eq!((prepared.bakes, prepared.dispatches), (1, 4));
+}
+
+/// The table of light of all orders is swept in shares until the light stands, and again for a sun that moves; never much in one frame.
+#[test]
+fn light_of_all_orders_comes_to_rest() {
+    let host = Host::new();
+    let mut clouds = Clouds::new(
+        &gpu().device,
+        veduta::programs(),
+        &Host::targets(),
+        &small(),
+    )
+    .unwrap();
+    let mut view = looking(300.0, 0.4);
+    let first = host.frame(&mut clouds, &view).0.dispatches;
+    let mut rest = None;
+    for k in 0..400 {
+        let work = host.frame(&mut clouds, &view).0;
+        assert!(work.dispatches <= 6, "{k} {work:?}");
+        match (work.dispatches, rest) {
+            (0, None) => rest = Some(k),
+            (more, Some(_)) => assert_eq!(more, 0, "work after rest in frame {k}"),
+            _ => {}
+        }
+    }
+    assert!(
+        first > 40 && rest.is_some_and(|k| k > 20),
+        "{first} {rest:?}"
+    );
+    let turned = Quat::from_rotation_z(0.02) * view.sun.to_light;
+    view.sun.to_light = turned.normalize();
+    let moved: u32 = (0..60)
+        .map(|_| host.frame(&mut clouds, &view).0.dispatches)
+        .sum();
+    assert!(moved > 8 + 20, "{moved}");
+    // At night the sun may go where it will.
+    let night = CloudLights {
+        sun: Vec3::ZERO,
+        ..CloudLights::clear(Vec3::ONE)
+    };
+    for _ in 0..200 {
+        let _ = host.lit_frame(&mut clouds, &view, &night);
+    }
+    let turned = Quat::from_rotation_z(0.02) * view.sun.to_light;
+    view.sun.to_light = turned.normalize();
+    let work = host.lit_frame(&mut clouds, &view, &night).0;
+    assert_eq!((work.bakes, work.dispatches), (0, 0), "{work:?}");
+    let work = host.frame(&mut clouds, &view).0;
+    assert_eq!(work.bakes, 1, "{work:?}");
+}
+
+/// Rays through every fourth pixel of a view of the host.
+fn pixel_rays(view: &View) -> Vec<(usize, ProbeRay)> {
+    let [middle, right, up] = view.rays().unwrap();
+    let mut rays = Vec::new();
+    for k in (2..Host::HEIGHT).step_by(4) {
+        for i in (2..Host::WIDTH).step_by(4) {
+            let at = |k: u32, n: u32| (2 * k + 1) as f32 / n as f32 - 1.0;
+            let ray = middle + at(i, Host::WIDTH) * right - at(k, Host::HEIGHT) * up;
+            let ray = ProbeRay {
+                altitude: view.eye.normalized().altitude(),
+                dir: ray.as_dvec3().normalize().to_array(),
+                to_sun: view.sun.to_light.as_dvec3().to_array(),
+                distance: f64::INFINITY,
+            };
+            rays.push(((k * Host::WIDTH + i) as usize, ray));
+        }
+    }
+    rays
+}
+
+/// Judges `march_tile_orders`, and `cells_at` by what it makes of it: thick clouds of the system against paths, the mean within 10 % and blocks of 8 x 8 pixels within 20 %
+/// of the root mean square, beside the reference's own noise. A white furnace stays white.
+#[test]
+fn thick_clouds_of_all_orders_meet_paths() {
+    let host = Host::new();
+    for (name, altitude, pitch, turn) in [
+        ("thesis", 300.0, 0.7, 0.4),
+        ("thesis", 300.0, 0.7, 3.5),
+        ("cumulus", 9000.0, -0.7, 1.5),
+        ("stratus", 300.0, 0.7, 1.5),
+    ] {
+        let options = CloudsOptions {
+            deck: CloudDeck::named(name).unwrap(),
+            ..Default::default()
+        };
+        let new = || {
+            Clouds::new(
+                &gpu().device,
+                veduta::programs(),
+                &Host::targets(),
+                &options,
+            )
+            .unwrap()
+        };
+        let mut view = looking(altitude, pitch);
+        view.eye = WorldPos::from_metres(DVec3::new(0.0, altitude, 0.0));
+        view.sun.to_light = direction(0.7, turn).as_vec3().normalize();
+        let bare = CloudLights {
+            sun: Vec3::ONE,
+            above: Vec3::ZERO,
+            below: Vec3::ZERO,
+        };
+        let mut clouds = new();
+        let mut words = Vec::new();
+        for _ in 0..60 {
+            words = host.lit_frame(&mut clouds, &view, &bare).2;
+        }
+        let rays = pixel_rays(&view);
+        let list: Vec<ProbeRay> = rays.iter().map(|r| r.1).collect();
+        let paths = VolumePaths {
+            samples: 192,
+            ..Default::default()
+        };
+        let truth = volume::layer_light(&options.deck, &list, Orders::All, &paths);
+        let found = |k: usize| f64::from(half(words[4 * rays[k].0]));
+        let count = rays.len() as f64;
+        let mean: f64 = truth.iter().map(|t| t[0]).sum::<f64>() / count;
+        let rms = (truth.iter().map(|t| t[0] * t[0]).sum::<f64>() / count).sqrt();
+        let noise = truth.iter().map(|t| t[1] * t[1]).sum::<f64>().sqrt() / count / mean;
+        let off = (0..rays.len()).map(found).sum::<f64>() / count / mean - 1.0;
+        // Two by two rays are eight by eight pixels.
+        let (mut square, mut noisy, mut blocks) = (0.0, 0.0, 0.0);
+        for k in 0..4 {
+            for i in 0..8 {
+                let members =
+                    [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| (2 * k + y) * 16 + 2 * i + x);
+                let part: f64 = members.iter().map(|m| found(*m) - truth[*m][0]).sum();
+                square += (part / 4.0).powi(2);
+                noisy += members.iter().map(|m| truth[*m][1].powi(2)).sum::<f64>() / 16.0;
+                blocks += 1.0;
+            }
+        }
+        let [square, noisy] = [square, noisy].map(|s: f64| (s / blocks).sqrt() / rms);
+        println!(
+            "{name} {altitude} {turn}: mean {off:+.3} (noise {noise:.3}), blocks {square:.3} (noise {noisy:.3})"
+        );
+        assert!(off.abs() < 0.1 + 2.0 * noise, "{name} {off} {noise}");
+        assert!(
+            square < (0.2_f64.powi(2) + noisy * noisy).sqrt(),
+            "{name} {square}"
+        );
+
+        let white = CloudLights {
+            sun: Vec3::ZERO,
+            above: Vec3::ONE,
+            below: Vec3::ONE,
+        };
+        let mut clouds = new();
+        for frame in 0..3 {
+            for pixel in host.lit_frame(&mut clouds, &view, &white).2.chunks(4) {
+                let sum = half(pixel[0]) + half(pixel[3]);
+                assert!((0.97..=1.01).contains(&sum), "{name} {frame} {sum}");
+            }
+        }
+    }
 }
 
 #[test]

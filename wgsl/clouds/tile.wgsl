@@ -42,6 +42,116 @@ fn tile_at(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: v
     return textureSampleLevel(tile, linear, vec3<f32>(place, level), 0.0).xy;
 }
 
+/// Share of the sun's light that the layer lets straight through to a point given relative to the eye, below, inside or above it.
+///
+/// domain  relative in [-1e5, 1e5] m lin
+/// domain  altitude in [0, 1e5] m lin
+/// range   [0, 1] 1
+/// error   5e-2 abs of reference::clouds::sun_depth
+/// outside undefined
+/// source  ours
+fn cloud_shadow(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: vec2<f32>, altitude: f32) -> f32 {
+    // Where the sun's ray meets the layer.
+    let met = clamp(altitude, layer.bottom, layer.bottom + layer.thickness);
+    return exp(-tile_at(tile, linear, layer, relative + layer.shear * (met - altitude), met).y);
+}
+
+/// Light of all orders along a ray through the layer, in parts that light and phase function weigh.
+struct OrderedLight {
+    /// Of the sun's light that has come straight to where it was scattered, what nothing takes away but scattering at all angles [1].
+    whole: f32,
+    /// The same where the peak of the phase function takes nothing away.
+    kept: f32,
+    /// What was scattered before: of the sun's light, for an irradiance of 1 [1/sr]; of the light from above and from below, for a radiance of 1 [1].
+    before: vec3<f32>,
+    /// Transmittance of the ray.
+    transmittance: f32,
+    /// Transmittance where the peak takes nothing away.
+    kept_transmittance: f32,
+}
+
+/// What the cells of a layer scatter at a point given relative to the eye, towards a view whose cosine to the sun is `nu`: of the sun's light for an
+/// irradiance of 1, of the light from above and of that from below for a radiance of 1.
+///
+/// domain  relative in [-1e5, 1e5] m lin
+/// domain  altitude in [4000, 5500] m lin
+/// domain  nu in [-1, 1] 1 lin
+/// range   [0, 6.5e4] 1
+/// error   2e-1 rel of reference::volume::layer_light
+/// outside undefined
+/// source  ours
+fn cells_at(cells: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: vec2<f32>, altitude: f32, nu: f32) -> vec3<f32> {
+    let level = clamp((altitude - layer.bottom) / max(layer.thickness, 1e-3), 0.0, 1.0);
+    let place = layer.place + relative * layer.tiles_per_metre;
+    let found = textureSampleLevel(cells, linear, vec3<f32>(place, level), 0.0);
+    return vec3<f32>(max(found.x + found.y * nu, 0.0), found.zw);
+}
+
+/// Light of all orders of the cloud layer along a view ray up to `max_distance`, stepped as [`march_tile`] is, with a fetch more a step. The phase function is one
+/// part that turns light and a peak that hardly does; `kept` is what is left of the extinction without the peak, `nu` the cosine between view and sun.
+/// Ends when less than `min_transmittance` is left without the peak.
+///
+/// domain  kept in [0.001, 1] 1 lin
+/// domain  nu in [-1, 1] 1 lin
+/// domain  ground_radius in [3e6, 1e8] m log
+/// domain  eye_altitude in [0, 1e5] m lin
+/// domain  dir in [-1, 1] 1 lin
+/// domain  max_distance in [0, 1e5] m lin
+/// domain  min_transmittance in [0, 0.1] 1 lin
+/// domain  steps in [1, 512] 1 lin
+/// range   [0, 1e6] 1
+/// error   1e-1 rel of reference::volume::layer_light
+/// outside undefined
+/// source  ours
+fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: sampler, layer: CloudTile, kept: f32, nu: f32, ground_radius: f32, eye_altitude: f32,
+    dir: vec3<f32>, max_distance: f32, min_transmittance: f32, steps: i32) -> OrderedLight {
+    let whole = shell_segment(ground_radius, layer.bottom, layer.bottom + layer.thickness, eye_altitude, dir.y);
+    let segment = clip_segment(whole, max_distance);
+    let size = segment_length(segment);
+    let share = sqrt(size / max(8.0 * layer.thickness, 1e-3));
+    let count = select(0, clamp(i32(ceil(f32(steps) * share)), 2, 4 * max(steps, 1)), size > 0.0);
+    let even = size / f32(max(count, 1));
+    let middle = 0.5 * (segment.near + segment.far);
+    let level = altitude_along(ground_radius, eye_altitude, dir.y, middle);
+    let radius = ground_radius + level;
+    let rise = clamp(((ground_radius + eye_altitude) * dir.y + middle) / radius, -1.0, 1.0);
+    let bend = 0.5 * (1.0 - rise * rise) / radius;
+    let deepest = -log(max(min_transmittance, 1e-20)) / max(kept, 1e-3);
+    var t = segment_distance(segment, 0.0);
+    let before = t - middle;
+    var here = tile_at(tile, linear, layer, dir.xz * t, level + before * (rise + before * bend));
+    var depth = 0.0;
+    var reach = here.y;
+    var lit = exp(-vec2<f32>(1.0, kept) * reach);
+    var left = 1.0;
+    var once = vec2<f32>(0.0);
+    var sent = vec3<f32>(0.0);
+    var s = 0.0;
+    for (var i = 0; i < count && s < size && depth < deepest; i++) {
+        s = min(s + max(even, -layer.clear * here.x), size);
+        let at = segment_distance(segment, s);
+        let off = at - middle;
+        let next = tile_at(tile, linear, layer, dir.xz * at, level + off * (rise + off * bend));
+        let added = mean_density(here.x, next.x) * layer.extinction * (at - t);
+        depth += added;
+        let ahead = depth + next.y;
+        let dim = exp(-vec2<f32>(1.0, kept) * ahead);
+        let change = vec2<f32>(1.0, kept) * (ahead - reach);
+        let mean = select((lit - dim) / change, 0.33333334 * (0.5 * (lit + dim) + 2.0 * sqrt(lit * dim)), abs(change) < vec2<f32>(0.5));
+        once += added * mean;
+        let through = exp(-kept * depth);
+        let half_way = 0.5 * (at + t);
+        let between = half_way - middle;
+        sent += (left - through) * cells_at(cells, linear, layer, dir.xz * half_way, level + between * (rise + between * bend), nu);
+        left = through;
+        lit = dim;
+        reach = ahead;
+        here = next;
+        t = at;
+    }
+    return OrderedLight(once.x, once.y, sent, exp(-depth), left);
+}
+
 /// Light of the cloud layer along a view ray up to `max_distance`, in steps of one fetch, for an albedo and a phase function of 1. `steps` are those of a
 /// ray that is eight times as long in the layer as the layer is thick; a longer ray takes more, a shorter one less, by the root of its length. Steps grow
 /// where the tile says that no cloud is near. Light and depth of a step are exact where its extinction is even and the depth to the sun changes

@@ -22,12 +22,15 @@ struct CloudDraw {
     depth_numerator: f32,
     to_sun: vec3<f32>,
     depth_offset: f32,
-    // Irradiance of the sun at the clouds, times the albedo.
+    // Irradiance of the sun at the clouds; times the albedo without CLOUD_ORDERS.
     sun_light: vec3<f32>,
     min_transmittance: f32,
-    // Radiance from around that the clouds scatter [1/sr], times the albedo.
-    ambient: vec3<f32>,
+    // Radiance that comes to the clouds from above and from below; without CLOUD_ORDERS the mean of both times the albedo, twice.
+    above: vec3<f32>,
     extinction: f32,
+    below: vec3<f32>,
+    // Share of the extinction that is left without the peak of the phase function.
+    kept: f32,
     place: vec2<f32>,
     shear: vec2<f32>,
     tiles_per_metre: f32,
@@ -60,8 +63,12 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 
 #FRAGMENT{
     #CODE{
+#ifdef CLOUD_ORDERS
+#import veduta::clouds::tile::{CloudTile, march_tile_orders}
+#else
 #import veduta::clouds::tile::{CloudTile, march_tile}
 #import veduta::lighting::phase::{phase_double_henyey_greenstein}
+#endif
 #import veduta::planet::shell::{ground_distance}
     }#
     #USE{ VARYING }#
@@ -70,6 +77,21 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 @group(1) @binding(1) var tile: texture_3d<f32>;
 #ifdef CLOUD_OVER_DEPTH
 @group(1) @binding(2) var host_depth: texture_depth_2d;
+#endif
+#ifdef CLOUD_ORDERS
+@group(1) @binding(3) var cells: texture_3d<f32>;
+
+// What the two parts of the sun's own light are weighed by at 128 angles between view and sun, whose roots are even; two to a vector.
+struct CloudWeights {
+    pairs: array<vec4<f32>, 64>,
+}
+
+@group(0) @binding(1) var<uniform> weights: CloudWeights;
+
+fn weight_at(i: i32) -> vec2<f32> {
+    let pair = weights.pairs[i / 2];
+    return select(pair.xy, pair.zw, i % 2 == 1);
+}
 #endif
 
 override CLOUD_STEPS: i32 = 64;
@@ -87,9 +109,22 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     far = select(min(far, max(reached, 0.0)), far, depth == draw_view.sky_depth || reached > 1e8);
 #endif
     let layer = CloudTile(draw_view.place, draw_view.shear, draw_view.tiles_per_metre, draw_view.bottom, draw_view.thickness, draw_view.levels, draw_view.extinction, draw_view.clear);
+    let nu = clamp(dot(dir, draw_view.to_sun), -1.0, 1.0);
+#ifdef CLOUD_ORDERS
+    let light = march_tile_orders(tile, cells, linear, layer, draw_view.kept, nu, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS);
+    let x = clamp(sqrt(acos(nu) * 0.31830989), 0.0, 1.0) * 127.0;
+    let i = min(i32(x), 126);
+    let weight = mix(weight_at(i), weight_at(i + 1), x - f32(i));
+    let sun = max(weight.x * light.whole + weight.y * light.kept, 0.0) + light.before.x;
+    // What the peak scatters of the light behind.
+    let behind = select(draw_view.above, draw_view.below, ground >= 0.0 || dir.y < 0.0) * (light.kept_transmittance - light.transmittance);
+    let around = draw_view.above * light.before.y + draw_view.below * light.before.z + behind;
+    return vec4<f32>(sun * draw_view.sun_light + around, light.transmittance);
+#else
     let light = march_tile(tile, linear, layer, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS);
-    let phase = phase_double_henyey_greenstein(dot(dir, draw_view.to_sun), draw_view.g_forward, draw_view.g_backward, draw_view.backward_share);
-    return vec4<f32>(light.scatter * phase * draw_view.sun_light + (1.0 - light.transmittance) * draw_view.ambient, light.transmittance);
+    let phase = phase_double_henyey_greenstein(nu, draw_view.g_forward, draw_view.g_backward, draw_view.backward_share);
+    return vec4<f32>(light.scatter * phase * draw_view.sun_light + (1.0 - light.transmittance) * draw_view.above, light.transmittance);
+#endif
 }
     }#
 }#

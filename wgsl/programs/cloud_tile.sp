@@ -4,7 +4,12 @@ Bakes rows of the tile of a cloud layer: every column follows a ray to the sun, 
 
 #COMPUTE{
     #CODE{
+#ifdef CLOUD_SHAPED
+#import veduta::clouds::field::{CloudLayer}
+#import veduta::clouds::shape::{CloudShape, shaped_density}
+#else
 #import veduta::clouds::field::{CloudLayer, uncut_density}
+#endif
 #import veduta::clouds::integral::{mean_density}
 
 struct TileRows {
@@ -26,6 +31,13 @@ struct TileRows {
     uniformity: f32,
     extinction: f32,
     seed: u32,
+    // Of clouds with forms.
+    kind: f32,
+    kind_spread: f32,
+    coverage_spread: f32,
+    detail: f32,
+    sharpness: f32,
+    weather_doublings: u32,
 }
 
 @group(0) @binding(0) var<uniform> tile: TileRows;
@@ -56,7 +68,13 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
         let at = foot + tile.shear * up;
         // Not beyond the spheres by rounding.
         let altitude = clamp(tile.bottom + up, tile.bottom, tile.bottom + tile.thickness);
-        let density = clamp(uncut_density(layer, vec3<f32>(at.x, 0.0, at.y), altitude), -1000.0, 1.0);
+#ifdef CLOUD_SHAPED
+        let shape = CloudShape(tile.kind, tile.kind_spread, tile.coverage_spread, tile.detail, tile.sharpness, tile.weather_doublings);
+        let found = shaped_density(layer, shape, vec3<f32>(at.x, 0.0, at.y), altitude);
+#else
+        let found = uncut_density(layer, vec3<f32>(at.x, 0.0, at.y), altitude);
+#endif
+        let density = clamp(found, -1000.0, 1.0);
         depth += select(scale * mean_density(above, density), 0.0, j == tile.levels - 1);
         above = density;
         texels[(j * tile.rows + column / tile.texels) * tile.texels + i] = half(density) | (half(min(depth, 6e4)) << 16u);

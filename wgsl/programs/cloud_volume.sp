@@ -55,6 +55,11 @@ struct CloudGrid {
     thickness: f32,
     ground_radius: f32,
     levels: f32,
+    // The first cell that is filled, the first direction that is swept.
+    first: i32,
+    // What a step towards the next order is taken by, and how far the step before is gone on with.
+    gain: f32,
+    momentum: f32,
 }
 
 @group(0) @binding(0) var<uniform> grid: CloudGrid;
@@ -140,28 +145,46 @@ fn baked_depth(point: vec3<f32>) -> f32 {
 // Extinction without the peak [1/m] and the mean of the sun's light over what there is in the cell.
 @group(2) @binding(1) var<storage, read_write> filled: array<vec2<f32>>;
 
+// Of each direction, as bits: its sixteen harmonics; the cells along the axis of the sweep and across it, and the sense of the sweep; the strides;
+// where the ray comes from in the plane before, in cells, and the way from there [m].
+struct Ways {
+    all: array<vec4<u32>, 168>,
+}
+
+@group(0) @binding(1) var<uniform> ways: Ways;
+
 struct Way {
     zeroth: vec4<f32>,
     second: vec4<f32>,
     middle: vec4<f32>,
     third: vec4<f32>,
-    // Cells and strides along the axis of the sweep and across it, and the sense of the sweep.
     counts: vec4<i32>,
     strides: vec4<i32>,
-    // Where the ray comes from in the plane before, in cells, and the way from there [m].
     shift: vec3<f32>,
 }
 
-@group(1) @binding(2) var<storage, read> ways: array<Way>;
+const WAYS: i32 = 24;
+
+fn way_part(at: i32) -> vec4<f32> {
+    return bitcast<vec4<f32>>(ways.all[at]);
+}
+
+fn way_of(j: i32) -> Way {
+    let at = 7 * j;
+    return Way(way_part(at), way_part(at + 1), way_part(at + 2), way_part(at + 3), vec4<i32>(ways.all[at + 4]), vec4<i32>(ways.all[at + 5]), way_part(at + 6).xyz);
+}
 
 @group(1) @binding(3) var<storage, read> cells: array<vec2<f32>>;
 @group(1) @binding(4) var<storage, read> source: array<f32>;
 @group(2) @binding(2) var<storage, read_write> radiance: array<f32>;
+@group(2) @binding(6) var<storage, read_write> faces: array<f32>;
 
 @group(1) @binding(5) var<storage, read> arrived: array<f32>;
 @group(1) @binding(6) var<storage, read> coarser: array<vec4<f32>>;
 @group(2) @binding(3) var<storage, read_write> sent: array<f32>;
 @group(2) @binding(4) var<storage, read_write> found_moments: array<vec4<f32>>;
+// Those of the step before.
+@group(2) @binding(8) var<storage, read_write> last_moments: array<vec4<f32>>;
 
 struct CubeRay {
     origin: vec3<f32>,
@@ -234,7 +257,7 @@ fn find_depths(@builtin(global_invocation_id) id: vec3<u32>) {
 @compute @workgroup_size(64)
 fn fill(@builtin(global_invocation_id) id: vec3<u32>) {
     let n = grid.cells;
-    let i = i32(id.x);
+    let i = i32(id.x) + grid.first;
     if i >= n.x * n.y * n.z {
         return;
     }
@@ -262,19 +285,59 @@ fn fill(@builtin(global_invocation_id) id: vec3<u32>) {
 #ifdef CLOUD_SWEEP
 @compute @workgroup_size(256)
 fn sweep(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let way = ways[group.x];
+    let number = i32(group.x) + grid.first;
+    let way = way_of(number);
     let all = grid.cells.x * grid.cells.y * grid.cells.z;
-    let start = i32(group.x) * all;
-    let first = floor(way.shift.xy);
-    let part = way.shift.xy - first;
+    let start = number * all;
+    let down = floor(way.shift.xy);
+    let part = way.shift.xy - down;
+#ifdef CLOUD_LAYERED
+    // Within one period, so that one comparison wraps a neighbour.
+    let across = vec2<f32>(way.counts.yz);
+    let first = vec2<i32>(down - across * floor((down + 0.5) / across));
+#else
+    let first = vec2<i32>(down);
+#endif
     let plane_cells = way.counts.y * way.counts.z;
+#ifdef CLOUD_LAYERED
+    // Light goes from face to face through cells of even density and source, from level to level; cells keep the mean of what goes through them.
+    let outside = select(grid.below, grid.uniform_light, way.counts.w < 0);
+    for (var plane = 0; plane < way.counts.x; plane++) {
+        let k = select(plane, way.counts.x - 1 - plane, way.counts.w < 0);
+        // Faces of two levels are kept, in turns.
+        let here_faces = (2 * number + (plane & 1)) * plane_cells;
+        let before = (2 * number + 1 - (plane & 1)) * plane_cells;
+        for (var c = i32(lane); c < plane_cells; c += 256) {
+            // Without a division of integers, which is slow; exact for so few cells.
+            let b = i32((f32(c) + 0.5) / f32(way.counts.y));
+            let a = c - b * way.counts.y;
+            let here = k * way.strides.x + a * way.strides.y + b * way.strides.z;
+            var arriving = outside;
+            if plane > 0 {
+                let low = vec2<i32>(a, b) + first;
+                let next = low + 1;
+                let n = way.counts.yz;
+                let wa = vec2<i32>(select(low.x, low.x - n.x, low.x >= n.x), select(next.x, next.x - n.x, next.x >= n.x)) + before;
+                let wb = vec2<i32>(select(low.y, low.y - n.y, low.y >= n.y), select(next.y, next.y - n.y, next.y >= n.y)) * n.x;
+                arriving = mix(mix(faces[wa.x + wb.x], faces[wa.y + wb.x], part.x), mix(faces[wa.x + wb.y], faces[wa.y + wb.y], part.x), part.y);
+            }
+            let own = source[start + here];
+            let depth = cells[here].x * way.shift.z;
+            faces[here_faces + c] = own + (arriving - own) * exp(-depth);
+            radiance[start + here] = own + (arriving - own) * one_minus_exp_over_x(depth);
+        }
+        storageBarrier();
+    }
+}
+#else
     for (var plane = 0; plane < way.counts.x; plane++) {
         let k = select(plane, way.counts.x - 1 - plane, way.counts.w < 0);
         let before = k - way.counts.w;
         let has_before = before >= 0 && before < way.counts.x;
         for (var c = i32(lane); c < plane_cells; c += 256) {
-            let a = c % way.counts.y;
-            let b = c / way.counts.y;
+            // Without a division of integers, which is slow; exact for so few cells.
+            let b = i32((f32(c) + 0.5) / f32(way.counts.y));
+            let a = c - b * way.counts.y;
             let here = k * way.strides.x + a * way.strides.y + b * way.strides.z;
             var sigma = 0.0;
             var emitted = 0.0;
@@ -282,18 +345,12 @@ fn sweep(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
             for (var j = 0; j < 4; j++) {
                 let ja = j & 1;
                 let jb = j >> 1u;
-                let ka = a + i32(first.x) + ja;
-                let kb = b + i32(first.y) + jb;
+                let ka = a + first.x + ja;
+                let kb = b + first.y + jb;
                 let weight = select(1.0 - part.x, part.x, ja == 1) * select(1.0 - part.y, part.y, jb == 1);
-#ifdef CLOUD_LAYERED
-                let inside = has_before;
-                let at = select(here, before * way.strides.x + ((ka + 64 * way.counts.y) % way.counts.y) * way.strides.y + ((kb + 64 * way.counts.z) % way.counts.z) * way.strides.z, inside);
-                let outside = select(grid.below, grid.uniform_light, way.counts.w < 0);
-#else
                 let inside = has_before && ka >= 0 && ka < way.counts.y && kb >= 0 && kb < way.counts.z;
                 let at = select(here, before * way.strides.x + ka * way.strides.y + kb * way.strides.z, inside);
                 let outside = grid.uniform_light;
-#endif
                 let thickness = select(0.0, weight * cells[at].x, inside);
                 sigma += thickness;
                 emitted += thickness * source[start + at];
@@ -309,8 +366,19 @@ fn sweep(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
         storageBarrier();
     }
 }
+#endif
 #else
 #ifdef CLOUD_GATHER
+#ifndef CLOUD_PROLONG
+// The next guess from what the last one gives: a step that is longer than that, and some of the step before (Polyak's heavy ball).
+fn gone_on(at: i32, given: vec4<f32>) -> vec4<f32> {
+    let held = found_moments[at];
+    let next = held + grid.gain * (given - held) + grid.momentum * (held - last_moments[at]);
+    last_moments[at] = held;
+    return next;
+}
+#endif
+
 // What a cell scatters into each direction, from what comes to it and from the sun.
 @compute @workgroup_size(64)
 fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -321,7 +389,6 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     var sum = Harmonics(vec4<f32>(0.0), vec4<f32>(0.0), vec4<f32>(0.0), vec4<f32>(0.0));
-    let count = i32(arrayLength(&ways));
     let d = grid.degrees;
     let d_zeroth = vec4<f32>(d.x, d.y, d.y, d.y);
     let d_middle = vec4<f32>(d.z, d.w, d.w, d.w);
@@ -341,32 +408,66 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
         sum.third += weight * coarser[at + 3];
     }
 #else
-    let share = 12.566371 / f32(count);
-    for (var j = 0; j < count; j++) {
+    let share = 12.566371 / f32(WAYS);
+    for (var j = 0; j < WAYS; j++) {
+        let at = 7 * j;
         let light = share * arrived[j * all + i];
-        sum.zeroth += light * ways[j].zeroth;
-        sum.second += light * ways[j].second;
-        sum.middle += light * ways[j].middle;
-        sum.third += light * ways[j].third;
+        sum.zeroth += light * way_part(at);
+        sum.second += light * way_part(at + 1);
+        sum.middle += light * way_part(at + 2);
+        sum.third += light * way_part(at + 3);
     }
-    sum.zeroth *= d_zeroth;
-    sum.second *= d.z;
-    sum.middle *= d_middle;
-    sum.third *= d.w;
+    sum.zeroth = gone_on(4 * i, sum.zeroth * d_zeroth);
+    sum.second = gone_on(4 * i + 1, sum.second * d.z);
+    sum.middle = gone_on(4 * i + 2, sum.middle * d_middle);
+    sum.third = gone_on(4 * i + 3, sum.third * d.w);
 #endif
     found_moments[4 * i] = sum.zeroth;
     found_moments[4 * i + 1] = sum.second;
     found_moments[4 * i + 2] = sum.middle;
     found_moments[4 * i + 3] = sum.third;
+#ifdef CLOUD_PROLONG
+    last_moments[4 * i] = sum.zeroth;
+    last_moments[4 * i + 1] = sum.second;
+    last_moments[4 * i + 2] = sum.middle;
+    last_moments[4 * i + 3] = sum.third;
+#endif
     let straight = harmonics(-grid.to_sun);
     let lit = grid.sun * cells[i].y;
     sum.zeroth += lit * d_zeroth * straight.zeroth;
     sum.second += lit * d.z * straight.second;
     sum.middle += lit * d_middle * straight.middle;
     sum.third += lit * d.w * straight.third;
-    for (var j = 0; j < count; j++) {
-        sent[j * all + i] = dot(sum.zeroth, ways[j].zeroth) + dot(sum.second, ways[j].second) + dot(sum.middle, ways[j].middle) + dot(sum.third, ways[j].third);
+    for (var j = 0; j < WAYS; j++) {
+        let at = 7 * j;
+        sent[j * all + i] = dot(sum.zeroth, way_part(at)) + dot(sum.second, way_part(at + 1)) + dot(sum.middle, way_part(at + 2)) + dot(sum.third, way_part(at + 3));
     }
+}
+#else
+#ifdef CLOUD_PUBLISH
+// Moments of what cells scatter of the light from above and from below; of the sun's in `moments`.
+@group(1) @binding(10) var<storage, read> from_above: array<vec4<f32>>;
+@group(1) @binding(11) var<storage, read> from_below: array<vec4<f32>>;
+@group(2) @binding(7) var<storage, read_write> texels: array<vec2<u32>>;
+
+// The bits of a number from -65,000 to 65,000 as a 16-bit float, rounded; what is within 6e-5 of 0 may become 0.
+fn half(x: f32) -> u32 {
+    return ((bitcast<u32>(abs(x) * 1.92592994e-34) + 0x1000u) >> 13u) | select(0u, 0x8000u, x < 0.0);
+}
+
+// A texel a cell: what it scatters of the sun's light evenly, and for each unit of the cosine between view and sun; of the light from above, and from below.
+@compute @workgroup_size(64)
+fn publish(@builtin(global_invocation_id) id: vec3<u32>) {
+    let n = grid.cells;
+    let i = i32(id.x);
+    if i >= n.x * n.y * n.z {
+        return;
+    }
+    let found = moments[4 * i];
+    let along = -0.48860251 * dot(found.wyz, grid.to_sun);
+    let even = 0.28209479 * vec3<f32>(found.x, from_above[4 * i].x, from_below[4 * i].x);
+    let at = vec3<i32>(i % n.x, (i / n.x) % n.y, i / (n.x * n.y));
+    texels[(at.y * n.z + at.z) * n.x + at.x] = vec2<u32>(half(even.x) | (half(along) << 16u), half(even.y) | (half(even.z) << 16u));
 }
 #else
 #ifdef CLOUD_LAYERED
@@ -486,6 +587,7 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     // Four degrees of a needle can fall a little below nothing.
     results[id.x] = CubeLight(max(scatter, 0.0), through);
 }
+#endif
 #endif
 #endif
 #endif

@@ -93,7 +93,8 @@ impl Canvas<'_> {
         let gpu = &self.bench.gpu;
         let lights = CloudLights {
             sun: view.sun.irradiance,
-            ambient: Vec3::ZERO,
+            above: Vec3::ZERO,
+            below: Vec3::ZERO,
         };
         let target = self.texture.create_view(&Default::default());
         spent(|| {
@@ -222,8 +223,10 @@ pub fn run(
     };
     let programs = veduta::programs();
     let system = |quality: CloudQuality| {
+        // As the loop scatters.
         let options = CloudsOptions {
             quality,
+            orders: veduta::clouds::Orders::Single,
             ..Default::default()
         };
         Clouds::new(&gpu.device, programs, &targets, &options)

@@ -5,7 +5,7 @@ use veduta::reference::air_tables::{
     self, Moments, Scattered, SkyEye, SkyLook, SkyPlace, SkyTexel, SphereNode, SplitPhases, TopPath,
 };
 use veduta::reference::atmosphere::{Atmosphere, SkyLight};
-use veduta::reference::clouds::{CloudLayer, CloudLight};
+use veduta::reference::clouds::{CloudLayer, CloudLight, CloudShape};
 use veduta::reference::field::{self, Field, Ground};
 use veduta::reference::fractal::warp;
 use veduta::reference::globe::{self, Globe, GlobeGround};
@@ -60,6 +60,18 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
     (
         "veduta::clouds::tile::march_tile",
         "a_layer_from_its_tile_meets_the_march",
+    ),
+    (
+        "veduta::clouds::tile::march_tile_orders",
+        "thick_clouds_of_all_orders_meet_paths",
+    ),
+    (
+        "veduta::clouds::tile::cloud_shadow",
+        "shadows_of_clouds_meet_the_reference",
+    ),
+    (
+        "veduta::clouds::tile::cells_at",
+        "thick_clouds_of_all_orders_meet_paths",
     ),
     (
         "veduta::clouds::tile::tile_at",
@@ -395,6 +407,21 @@ impl Argument for CloudLayer {
             g_backward: take(&mut rest),
             backward_share: take(&mut rest),
             seed: take(&mut rest),
+        }
+    }
+}
+
+impl Argument for CloudShape {
+    const COLUMNS: usize = 6;
+    fn read(bits: &[u32]) -> CloudShape {
+        let mut rest = bits;
+        CloudShape {
+            kind: take(&mut rest),
+            kind_spread: take(&mut rest),
+            coverage_spread: take(&mut rest),
+            detail: take(&mut rest),
+            sharpness: take(&mut rest),
+            weather_doublings: take(&mut rest),
         }
     }
 }
@@ -1572,6 +1599,25 @@ pub fn registry() -> Vec<Entry> {
             &layer, relative, altitude
         )
     );
+    same!(list, "clouds::shape", "clouds", clouds, kind_profile);
+    other!(
+        list,
+        "clouds::shape::billows",
+        "clouds::billows",
+        |turn: [u32; 3], bits: u32, seed: u32| clouds::billows(
+            turn.map(|t| f64::from(t) * 0.5_f64.powi(32)),
+            bits,
+            seed
+        )
+    );
+    other!(
+        list,
+        "clouds::shape::shaped_density",
+        "clouds::shaped_density",
+        |layer: CloudLayer, shape: CloudShape, relative: [f64; 3], altitude: f64| {
+            clouds::shaped_density(&layer, &shape, relative, altitude)
+        }
+    );
     other!(
         list,
         "clouds::march::layer_exit",
@@ -2208,6 +2254,15 @@ fn particular(entry: Entry) -> Entry {
             .jumps("the layer's borders", 1e-6)
             .weight(20.0),
         ("clouds::field", "uncut_density") => entry.layer().weight(20.0),
+        ("clouds::shape", "shaped_density") => entry
+            .layer()
+            .lin("shape.kind", 0.0, 1.0)
+            .lin("shape.kind_spread", 0.0, 1.0)
+            .lin("shape.coverage_spread", 0.0, 2.0)
+            .lin("shape.detail", 0.0, 1.0)
+            .lin("shape.sharpness", 1.0, 8.0)
+            .lin("shape.weather_doublings", 1.0, 4.0)
+            .weight(20.0),
         ("clouds::march", "layer_exit") => entry.layer().jumps("tangent rays", 1e-6).weight(2.0),
         ("clouds::march", "sun_depth") => entry
             .layer()
