@@ -21,6 +21,7 @@ use crate::program::{
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Source {
     texts: BTreeMap<PathBuf, String>,
+    plug_ins: Vec<String>,
 }
 
 impl Source {
@@ -34,6 +35,13 @@ impl Source {
             source.add(folder)?;
         }
         Ok(source)
+    }
+
+    /// Lets the `override fn` of a module take effect in every program that reaches the virtual function, as `veduta_compose::Build::plug_in` does in a build.
+    #[must_use]
+    pub fn plug_in(mut self, module: impl Into<String>) -> Source {
+        self.plug_ins.push(module.into());
+        self
     }
 
     fn add(&mut self, folder: &Path) -> Result<(), Error> {
@@ -103,6 +111,7 @@ impl Source {
         let sizes: BTreeMap<String, i64> =
             sizes.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
         let composed = Composer::new(&library, keys)
+            .plug_ins(self.plug_ins.clone())
             .compose(&sp, &features, &sizes)
             .map_err(faults)?;
         self::program(&composed)

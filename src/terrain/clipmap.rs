@@ -15,7 +15,7 @@ use crate::view::WorldPos;
 
 /// How finely and how far heights are baked.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClipmapOptions {
+pub(super) struct ClipmapOptions {
     /// Texels of a level's side: 128, 256, 512 or 1024. A texel is about as wide as a pixel where it is used when this is 3.5 over the angle of a pixel.
     pub texels: u32,
     /// Levels at most, in [1, 16].
@@ -125,11 +125,14 @@ struct Span {
     to: [i64; 2],
 }
 
-/// Distance from an eye to the nearest ground (m), about, from heights below it and around it, wherever it looks; 1 for a program's own function.
+/// Distance from an eye to the nearest ground (m), about, from heights below it and around it, wherever it looks; over a program's own function the height above all ground, and 1 where that is not
+/// known.
 pub(super) fn nearest_ground(field: &Prepared<f32>, eye: WorldPos) -> f64 {
     let below = eye.altitude() - f64::from(field.ground(eye, 0.0).height);
     if below.is_nan() {
-        return 1.0;
+        return field
+            .bounds()
+            .map_or(1.0, |b| (eye.altitude() - b.maximum).max(1.0));
     }
     // Nothing farther off than the ground below can be nearer.
     let (place, reach) = (field.place(eye), below.abs());
@@ -356,7 +359,7 @@ impl Clipmap {
                 Slot { buffer, group }
             })
             .collect();
-        // Without bounds (a program's own function) rays end at 20 km.
+        // Without bounds (a program's own function) no ground is taken to be above 20 km.
         let top = land.field.bounds().map_or(2e4, |b| b.maximum) as f32;
         let places_view = places.create_view(&Default::default());
         let clip = buffer(device, "veduta clipmap", ClipBlock::SIZE);
@@ -651,7 +654,6 @@ impl Clipmap {
             eye_altitude: eye.altitude() as f32,
             spacing: self.spacing as f32,
             reach: (self.texels / 2 - BORDER) as f32,
-            top: self.top,
             texels: self.texels as i32,
             first: self.first as i32,
             levels: self.levels as i32,

@@ -60,15 +60,52 @@ pub enum Kind {
         /// How flat benches are and how steep cliffs, in [0, 1]; 0 is an fBm, 1 makes cliffs five times as steep as that.
         hardness: f64,
     },
-    /// The program's own WGSL function, put in the place of `veduta::terrain::height::height`. It has no bounds, and no height on the processor.
+    /// The program's own WGSL function, put in the place of `veduta::terrain::height::height`. It has no height on the processor.
     Own {
         /// Handed on as the terrain's gain.
         gain: f64,
         /// Handed on as the terrain's smoothness.
         smoothness: f64,
+        /// What holds of the function everywhere, whatever the footprint; without it rays end at 20 km of height, and take no longer steps where they are clear of the ground.
+        #[serde(default)]
+        bounds: Option<OwnBounds>,
     },
     /// The field's height map, with an fBm as detail: the wavelength is the width of a texel, the amplitude is that of the detail; 0 leaves it out.
     Map,
+}
+
+/// What a program says of its own function.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OwnBounds {
+    /// No value is below (m), in [-2e4, 2e4]; the field's base is added to it.
+    pub minimum: f64,
+    /// No value is above (m), in [-2e4, 2e4].
+    pub maximum: f64,
+    /// No slope is steeper, at least 0; infinite where that is not known.
+    pub lipschitz: f64,
+}
+
+impl OwnBounds {
+    fn check(&self) -> Result<(), Error> {
+        let fault = |name: &str, value: f64, domain: &str| {
+            Err(Error::OutOfDomain {
+                name: format!("field.kind.bounds.{name}"),
+                value: value.to_string(),
+                domain: domain.to_owned(),
+            })
+        };
+        if !(-2e4..=2e4).contains(&self.minimum) {
+            return fault("minimum", self.minimum, "in [-2e4, 2e4] m");
+        }
+        if !(self.minimum..=2e4).contains(&self.maximum) {
+            return fault("maximum", self.maximum, "from the minimum to 2e4 m");
+        }
+        if self.lipschitz.is_nan() || self.lipschitz < 0.0 {
+            return fault("lipschitz", self.lipschitz, "at least 0");
+        }
+        Ok(())
+    }
 }
 
 impl Kind {
@@ -91,9 +128,10 @@ impl Kind {
         match self {
             Kind::Fbm | Kind::Map => [0.0; 2],
             Kind::Hybrid { offset } => [offset, 0.0],
-            Kind::Ridged { gain, smoothness } | Kind::Own { gain, smoothness } => {
-                [gain, smoothness]
-            }
+            Kind::Ridged { gain, smoothness }
+            | Kind::Own {
+                gain, smoothness, ..
+            } => [gain, smoothness],
             Kind::Craters { share, roughness } => [share, roughness],
             Kind::Mix { mountains } => [mountains, 0.0],
             Kind::Mesa { strata, hardness } => [strata, hardness],
@@ -173,6 +211,27 @@ pub struct Bounds {
     pub octaves: Vec<f64>,
 }
 
+impl Bounds {
+    /// No slope is steeper while so many octaves count, with one for what their means add.
+    pub(super) fn ladder(&self, kind: Kind) -> [f64; 17] {
+        let whole = self.lipschitz.min(1e30);
+        let rest = (whole - self.octaves.iter().sum::<f64>()).max(0.0);
+        // Which octave of the lattice each of them is.
+        let level = |i: usize| match (kind, i) {
+            (Kind::Mix { .. }, 0) => 0,
+            (Kind::Mix { .. }, 1..=3) => i + 1,
+            (Kind::Mix { .. }, _) => i - 1,
+            _ => i,
+        };
+        std::array::from_fn(|count| {
+            let counted = (0..)
+                .zip(&self.octaves)
+                .filter(|(i, _)| level(*i) < count || count == 16);
+            1.01 * (rest + counted.map(|(_, s)| s).sum::<f64>())
+        })
+    }
+}
+
 /// No gradient noise in 2D has a steeper slope, per cell: the largest over all places and vectors is 2.9262.
 const NOISE_SLOPE: f64 = 2.927;
 
@@ -244,9 +303,18 @@ impl HeightField {
             Kind::Fbm => Ok(()),
             Kind::Map => self.map.as_ref().map_or(Ok(()), HeightMap::check),
             Kind::Hybrid { offset } => within("kind.offset", offset, 0.0, 1.0, ""),
-            Kind::Ridged { gain, smoothness } | Kind::Own { gain, smoothness } => {
+            Kind::Ridged { gain, smoothness } => {
                 within("kind.gain", gain, 0.0, 4.0, "")?;
                 within("kind.smoothness", smoothness, 0.0, 1.0, "")
+            }
+            Kind::Own {
+                gain,
+                smoothness,
+                bounds,
+            } => {
+                within("kind.gain", gain, 0.0, 4.0, "")?;
+                within("kind.smoothness", smoothness, 0.0, 1.0, "")?;
+                bounds.map_or(Ok(()), |b| b.check())
             }
             Kind::Craters { share, roughness } => {
                 within("kind.share", share, 0.0, 1.0, "")?;
@@ -296,13 +364,14 @@ impl HeightField {
             Some(map) => Some(map.pyramid(self.lattice_wavelength())?),
             None => None,
         };
-        Ok(Prepared::new(self, &calibrate::tails(self), map))
+        let bounds = self.bounds().ok();
+        Ok(Prepared::new(self, &calibrate::tails(self), map, bounds))
     }
 
     /// What holds everywhere on it, by interval arithmetic from octave to octave.
     ///
     /// # Errors
-    /// As [`HeightField::check`]; [`Error::OutOfDomain`] for a program's own function, of which nothing is known, and for a height map that has not been read.
+    /// As [`HeightField::check`]; [`Error::OutOfDomain`] for a program's own function of which nothing is said, and for a height map that has not been read.
     pub fn bounds(&self) -> Result<Bounds, Error> {
         self.check()?;
         let fall = |i: u32| (-self.hurst * f64::from(i)).exp2();
@@ -369,11 +438,21 @@ impl HeightField {
                 slopes.extend(middle_slopes.iter().map(|s| s * bend));
                 slopes.extend(fine_slopes.iter().map(|s| s * 0.1 * lift));
             }
-            Kind::Own { .. } => {
+            Kind::Own {
+                bounds: Some(own), ..
+            } => {
+                return Ok(Bounds {
+                    minimum: self.base + own.minimum,
+                    maximum: self.base + own.maximum,
+                    lipschitz: own.lipschitz,
+                    octaves: Vec::new(),
+                });
+            }
+            Kind::Own { bounds: None, .. } => {
                 return Err(Error::OutOfDomain {
-                    name: "height_field".to_owned(),
-                    value: "a program's own height".to_owned(),
-                    domain: "a kind whose bounds are known".to_owned(),
+                    name: "field.kind.bounds".to_owned(),
+                    value: "None".to_owned(),
+                    domain: "what holds of the program's own function".to_owned(),
                 });
             }
         }

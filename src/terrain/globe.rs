@@ -76,7 +76,7 @@ impl Land {
         bounds.minimum = bounds.minimum.max(sea);
         bounds.maximum = bounds.maximum.max(sea);
         Ok(Globe {
-            field: Prepared::new(&self.field, &calibrate::tails(&self.field), None),
+            field: Prepared::new(&self.field, &calibrate::tails(&self.field), None, None),
             radius: self.planet_radius,
             sea,
             bounds,
@@ -307,11 +307,12 @@ impl<T: Real> Globe<T> {
         }
     }
 
-    /// The first place where a ray meets the field as its footprint filters it, by bracketing: steps of half a footprint, at least `least` metres, and bisection. A stretch
-    /// below the ground that is shorter than a step may be missed; nothing else can be. Its places are found in double precision.
+    /// The first place where a ray meets the field as its footprint filters it, by bracketing: steps of half a footprint, at least `least` metres, longer where bounds show the ray clear, and
+    /// bisection. A stretch below the ground that is shorter than half a footprint may be missed; nothing else can be. Its places are found in double precision. A ray that has taken 2^18 steps ends
+    /// as [`TerrainHit::capped`].
     ///
     /// # Errors
-    /// As [`TerrainRay::check`].
+    /// As [`TerrainRay::check`]; [`Error::OutOfDomain`] for an angle that is below 0 and a least step that is not above it.
     pub fn ray_hit(
         &self,
         ray: &TerrainRay,
@@ -348,11 +349,14 @@ impl<T: Real> Globe<T> {
             radius,
             mu,
             top: self.bounds.maximum,
-            far: ray.far.min(1e9),
+            far: ray.far.min(TerrainRay::FARTHEST_OVER_BALL),
             pixel_angle,
             least,
+            steep: self.bounds.ladder(self.kind()),
+            wavelength: self.lattice,
+            level: 1.01,
         };
-        Ok(search.first(clearance)?.map_or(TerrainHit::MISS, hit))
+        Ok(search.first(clearance)?.hit(hit))
     }
 }
 

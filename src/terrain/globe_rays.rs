@@ -1,8 +1,9 @@
 //! Heights of given places of a ball on the device, and where given rays meet it.
 
 use super::clipmap::group;
-use super::globe::GlobeGround;
+use super::globe::{Globe, GlobeGround};
 use super::land::Land;
+use super::query::{Program, check_places};
 use super::rays::{RayPath, TerrainHit, TerrainRay};
 use crate::device::Gpu;
 use crate::error::Error;
@@ -28,7 +29,7 @@ fn uniform(gpu: &Gpu, block: &GlobeBlock) -> wgpu::Buffer {
 /// Runs a program on rows of so many bytes; results have so many.
 fn run(
     gpu: &Gpu,
-    (pipeline, layouts): &(wgpu::ComputePipeline, Vec<wgpu::BindGroupLayout>),
+    (pipeline, layouts): &Program,
     globe: &wgpu::Buffer,
     rows: &[u8],
     sizes: [usize; 2],
@@ -65,7 +66,7 @@ fn number(row: &[u8], at: usize) -> f32 {
 /// The field of a land on a ball below or above positions, filtered by a footprint (m), as the device computes it. Submits and waits.
 ///
 /// # Errors
-/// As [`Land::globe`]; [`Error::OutOfDomain`] for a footprint that is not finite or below 0; the faults of [`ProgramSet::get`] and of making
+/// As [`Land::globe`]; [`Error::OutOfDomain`] for a footprint that is not finite or below 0 and for positions that are not finite; the faults of [`ProgramSet::get`] and of making
 /// the pipeline; [`Error::Device`].
 pub fn globe_heights(
     gpu: &Gpu,
@@ -75,13 +76,7 @@ pub fn globe_heights(
     footprint: f32,
 ) -> Result<Vec<GlobeGround<f32>>, Error> {
     let globe = land.globe::<f32>()?;
-    if !(footprint >= 0.0 && footprint.is_finite()) {
-        return Err(Error::OutOfDomain {
-            name: "footprint".to_owned(),
-            value: footprint.to_string(),
-            domain: "finite and at least 0 m".to_owned(),
-        });
-    }
+    check_places(positions, footprint)?;
     if positions.is_empty() {
         return Ok(Vec::new());
     }
@@ -109,34 +104,39 @@ pub fn globe_heights(
         .collect())
 }
 
-/// [`super::ray_hits`] over a ball; the rays are checked.
-pub(super) fn hits(
+/// The program that follows rays over a ball.
+pub(super) fn program(
     gpu: &Gpu,
     programs: &ProgramSet,
     land: &Land,
-    rays: &[TerrainRay],
-    pixel_angle: f32,
     path: RayPath,
-) -> Result<Vec<TerrainHit>, Error> {
-    let globe = land.globe::<f32>()?;
-    if rays.is_empty() {
-        return Ok(Vec::new());
-    }
+    steps: u32,
+) -> Result<Program, Error> {
     let features: &[&str] = match path {
         RayPath::Fast => &["TERRAIN_FAST"],
         RayPath::Textbook => &[],
     };
     let constants = [
         ("FIELD_KIND", f64::from(land.field.kind.number())),
-        ("MAX_MARCHING_STEPS", 4000.0),
+        ("MAX_MARCHING_STEPS", f64::from(steps)),
     ];
-    let program = compute(
+    compute(
         &gpu.device,
         programs,
         "terrain_globe_rays",
         features,
         &constants,
-    )?;
+    )
+}
+
+/// [`super::ray_hits`] over a ball; the rays are checked.
+pub(super) fn hits(
+    gpu: &Gpu,
+    program: &Program,
+    globe: &Globe<f32>,
+    rays: &[TerrainRay],
+    pixel_angle: f32,
+) -> Result<Vec<TerrainHit>, Error> {
     let top = globe.bounds().maximum;
     let mut hits = vec![TerrainHit::MISS; rays.len()];
     // Those that come below the highest ground: index, start, and what lies before it.
@@ -173,7 +173,10 @@ pub(super) fn hits(
         cells(&mut rows, place.cell);
         words(&mut rows, [*near as f32]);
         words(&mut rows, place.frac);
-        words(&mut rows, [(ray.far - near).min(1e9) as f32]);
+        words(
+            &mut rows,
+            [(ray.far - near).min(TerrainRay::FARTHEST_OVER_BALL) as f32],
+        );
         words(&mut rows, place.up);
         words(&mut rows, [globe.altitude(*start) as f32]);
         words(&mut rows, ray.dir.map(|c| c as f32));
@@ -182,7 +185,7 @@ pub(super) fn hits(
     let data = if followed.is_empty() {
         Vec::new()
     } else {
-        run(gpu, &program, &buffer, &rows, [64, 32])?
+        run(gpu, program, &buffer, &rows, [64, 32])?
     };
     for ((i, _, near), row) in followed.iter().zip(data.chunks_exact(32)) {
         let distance = f64::from(number(row, 12));

@@ -73,12 +73,12 @@ impl GlobeTerrain {
         }
         let globe = options.land.globe::<f32>()?;
         let settings = Settings::resolve(programs, &options.preset, None, &[])?;
-        let low = settings.number("TEXTURE_LOW_QUALITY").unwrap_or(0.0) != 0.0;
+        let number = |key: &str, or: f64| settings.number(key).unwrap_or(or);
         let constants = [
             ("FIELD_KIND", f64::from(options.land.field.kind.number())),
             ("OUTPUT", output_of(targets.color_format)?),
-            ("MAX_MARCHING_STEPS", if low { 300.0 } else { 600.0 }),
-            ("MAX_MARCHING_STEPS_SHADOW", if low { 16.0 } else { 40.0 }),
+            ("GLOBE_STEPS", number("GLOBE_STEPS", 600.0)),
+            ("GLOBE_STEPS_SHADOW", number("GLOBE_STEPS_SHADOW", 40.0)),
         ];
         let (pipeline, layouts) = surface_pipeline(
             device,

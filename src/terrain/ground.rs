@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::calibrate::Tails;
-use super::field::{HeightField, Kind};
+use super::field::{Bounds, HeightField, Kind};
 use super::map::Pyramid;
 use super::noise::{Place, craters, gradient_noise, octave_seed};
 use super::real::Real;
@@ -100,6 +100,7 @@ pub struct Prepared<T> {
     /// Place of the lattice's origin (x, z) (m).
     origin: [f64; 2],
     map: Option<Arc<Pyramid>>,
+    bounds: Option<Arc<Bounds>>,
     /// Wavelength of the lattice (m).
     pub(super) wavelength: T,
     pub(super) amplitude: T,
@@ -117,6 +118,7 @@ impl<T: Real> Prepared<T> {
         field: &HeightField,
         tails: &Tails,
         map: Option<Arc<Pyramid>>,
+        bounds: Option<Bounds>,
     ) -> Prepared<T> {
         let [mut shape, detail] = field.kind.parameters();
         if let Some(map) = &map {
@@ -132,6 +134,7 @@ impl<T: Real> Prepared<T> {
             lattice: field.lattice_wavelength(),
             origin: field.map.as_ref().map_or([0.0; 2], |m| m.origin),
             map,
+            bounds: bounds.map(Arc::new),
             wavelength: T::of(field.lattice_wavelength()),
             amplitude: T::of(field.amplitude),
             base: T::of(field.base),
@@ -146,6 +149,16 @@ impl<T: Real> Prepared<T> {
     /// What it is made of.
     pub fn kind(&self) -> Kind {
         self.kind
+    }
+
+    /// What holds everywhere on it; `None` for a program's own function of which nothing is said.
+    pub fn bounds(&self) -> Option<&Bounds> {
+        self.bounds.as_deref()
+    }
+
+    /// Wavelength of the lattice (m).
+    pub(super) fn lattice(&self) -> f64 {
+        self.lattice
     }
 
     /// Octaves.
@@ -196,8 +209,18 @@ impl<T: Real> Prepared<T> {
 
     /// The field at an offset (x, z) in metres from a place, as the device has it from the eye's.
     pub fn ground_from(&self, eye: Place<T>, offset: [T; 2], footprint: T) -> Ground<T> {
-        let frac = std::array::from_fn(|k| eye.frac[k] + offset[k] / self.wavelength);
-        self.ground_at(Place::new(eye.cell, frac), footprint)
+        // Whole cells are taken off before the division, by parts whose products are exact.
+        let (high, low) = self.wavelength.parts();
+        let whole = offset.map(|o| (o / self.wavelength).whole());
+        let frac = std::array::from_fn(|k| {
+            let rest = (offset[k] - whole[k] * high) - whole[k] * low;
+            eye.frac[k] + rest / self.wavelength
+        });
+        let place = Place::new(eye.cell, frac);
+        let cell =
+            std::array::from_fn(|k| place.cell[k].wrapping_add(whole[k].wide() as i64 as i32));
+        let place = Place { cell, ..place };
+        self.ground_at(place, footprint)
     }
 
     /// The pyramid of a height map.

@@ -19,15 +19,17 @@ mod noise_3d;
 #[cfg(feature = "reference")]
 mod picture;
 mod probe;
+mod query;
 mod rays;
 mod real;
+mod sky_lights;
 mod surface;
 mod system;
 
 pub use calibrate::{Tail, Tails};
+pub use clipmap::Clipmap;
 pub(crate) use clipmap::group;
-pub use clipmap::{Clipmap, ClipmapOptions};
-pub use field::{Bounds, Domain, HeightField, Kind};
+pub use field::{Bounds, Domain, HeightField, Kind, OwnBounds};
 pub use globe::{Globe, GlobeGround, GlobePlace};
 pub use globe_rays::globe_heights;
 pub use ground::{Ground, Prepared};
@@ -37,9 +39,10 @@ pub use land::{Land, Material, Sea};
 pub use map::{Edge, HeightMap, MapTexels};
 pub use noise::Place;
 #[cfg(feature = "reference")]
-pub use picture::{GroundPixel, land_picture};
+pub use picture::{GroundPixel, land_picture, land_picture_at};
 pub use probe::heights;
-pub use rays::{RayPath, TerrainHit, TerrainRay, ray_hits};
+pub use query::{TerrainQuery, ray_hits};
+pub use rays::{RayPath, TerrainHit, TerrainRay};
 pub use real::Real;
 pub use surface::Terrain;
 pub(crate) use system::surface_pipeline;

@@ -20,6 +20,8 @@ pub struct GroundPixel {
     pub distance: f64,
     /// Share of the sun's disc above the horizon.
     pub sun: f64,
+    /// Radiance if the whole disc were.
+    pub lit: [f64; 3],
 }
 
 /// Renders what `Terrain` draws with the preset `high`, row by row from the top; `None` where no ground is seen before `far` (m). Hits are found by bracketing, and the
@@ -31,8 +33,41 @@ pub fn land_picture(
     land: &Land,
     view: &View,
     lights: &TerrainLights,
+    size: [usize; 2],
+    far: f64,
+) -> Result<Vec<Option<GroundPixel>>, Error> {
+    shaded(land, view, lights, size, far, None)
+}
+
+/// As [`land_picture`], with the distances (m) at which the rays of the pixels are said to meet the ground, infinite where they do not: light and shadow apart from hits.
+///
+/// # Errors
+/// As [`land_picture`]; [`Error::OutOfDomain`] for another number of distances than of pixels.
+pub fn land_picture_at(
+    land: &Land,
+    view: &View,
+    lights: &TerrainLights,
+    size: [usize; 2],
+    far: f64,
+    distances: &[f64],
+) -> Result<Vec<Option<GroundPixel>>, Error> {
+    if distances.len() != size[0] * size[1] {
+        return Err(Error::OutOfDomain {
+            name: "distances".to_owned(),
+            value: format!("{} of them", distances.len()),
+            domain: format!("one for each of {}x{} pixels", size[0], size[1]),
+        });
+    }
+    shaded(land, view, lights, size, far, Some(distances))
+}
+
+fn shaded(
+    land: &Land,
+    view: &View,
+    lights: &TerrainLights,
     [columns, rows]: [usize; 2],
     far: f64,
+    distances: Option<&[f64]>,
 ) -> Result<Vec<Option<GroundPixel>>, Error> {
     land.check()?;
     view.check()?;
@@ -102,11 +137,17 @@ pub fn land_picture(
             dir: dir.to_array(),
             far,
         };
-        let hit = field.ray_hit(land.planet_radius, top, &ray, angle, 0.02)?;
-        if !hit.distance.is_finite() {
+        let t = match distances {
+            Some(distances) => distances[i],
+            None => {
+                field
+                    .ray_hit(land.planet_radius, &ray, angle, 0.02)?
+                    .distance
+            }
+        };
+        if !t.is_finite() {
             return Ok(None);
         }
-        let t = hit.distance;
         let offset = [dir.x * t, dir.z * t];
         let facing = -dot(
             field.ground_from(place, offset, angle * t).normal(),
@@ -129,15 +170,18 @@ pub fn land_picture(
             * snow_blend(level, border, low - blur, high + blur, noise);
         let bare = rock_high_faded(&rock, there, footprint);
         let sun = sun_share(offset, ground.height, footprint);
-        let light = shade_rough(&lights, ground.slope, ground.lost, to_sun.to_array(), sun);
-        let radiance = std::array::from_fn(|k| {
-            let albedo = bare[k] + snow * (f64::from(m.snow[k]) - bare[k]);
-            std::f64::consts::FRAC_1_PI * albedo * light[k]
-        });
+        let radiance = |sun: f64| {
+            let light = shade_rough(&lights, ground.slope, ground.lost, to_sun.to_array(), sun);
+            std::array::from_fn(|k| {
+                let albedo = bare[k] + snow * (f64::from(m.snow[k]) - bare[k]);
+                std::f64::consts::FRAC_1_PI * albedo * light[k]
+            })
+        };
         Ok(Some(GroundPixel {
-            radiance,
+            radiance: radiance(sun),
             distance: t,
             sun,
+            lit: radiance(1.0),
         }))
     };
     parallel_map(columns * rows, pixel).into_iter().collect()

@@ -1,15 +1,10 @@
-//! Where rays meet a terrain: on the device, along both paths, and on the processor.
+//! Rays and where they meet a terrain: on the processor, by bracketing.
 
-use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group, nearest_ground};
+use super::field::Kind;
 use super::ground::Prepared;
 use super::land::Land;
-use super::map::Relief;
 use super::real::Real;
-use crate::device::Gpu;
 use crate::error::Error;
-use crate::exchange::{Exchange, compute};
-use crate::program::ProgramSet;
-use crate::programs::blocks::{Field as FieldBlock, Planet as PlanetBlock};
 use crate::view::WorldPos;
 
 /// A ray.
@@ -19,7 +14,7 @@ pub struct TerrainRay {
     pub origin: WorldPos,
     /// Its direction, a unit vector: y up at the origin over a plane, along the world's axes over a ball.
     pub dir: [f64; 3],
-    /// Where it ends at the latest (m).
+    /// Where it ends at the latest (m), above 0; no ray goes beyond [`TerrainRay::FARTHEST`] or, over a ball, [`TerrainRay::FARTHEST_OVER_BALL`].
     pub far: f64,
 }
 
@@ -51,11 +46,17 @@ impl TerrainHit {
 pub enum RayPath {
     /// By steps in proportion to the clearance (Leitner 2022, algorithm 4).
     Textbook,
-    /// Over baked heights, with a last step on the field.
+    /// Many rays from one origin over baked heights with a last step on the field, and few rays over the field itself, by steps of half a footprint or longer ones that bounds allow, and a bracket.
     Fast,
 }
 
 impl TerrainRay {
+    /// Where rays over the plane end (m), on the processor and on the device: a ray that starts 100 km up has left the planet long before.
+    pub const FARTHEST: f64 = 1e6;
+
+    /// Where rays over a ball end (m).
+    pub const FARTHEST_OVER_BALL: f64 = 1e9;
+
     /// Checks its numbers.
     ///
     /// # Errors
@@ -67,6 +68,10 @@ impl TerrainRay {
             value,
             domain: domain.to_owned(),
         };
+        if !self.origin.frac.is_finite() {
+            let value = format!("{:?}", self.origin);
+            return Err(fault("the origin", value, "finite"));
+        }
         if length.is_nan() || (length - 1.0).abs() > 1e-3 {
             let value = format!("{:?}", self.dir);
             return Err(fault("the direction", value, "a unit vector"));
@@ -76,183 +81,6 @@ impl TerrainRay {
         }
         Ok(())
     }
-}
-
-/// Follows rays on the device. The footprint grows with the distance by `pixel_angle` (rad). Submits and waits; rays with one origin are followed together,
-/// and on the path `Fast` heights are baked around each origin. Over a ball each ray starts where it comes below the highest ground, which is found in `f64`.
-///
-/// # Errors
-/// As [`Land::check`] and [`TerrainRay::check`]; the faults of making pipelines; [`Error::Device`].
-pub fn ray_hits(
-    gpu: &Gpu,
-    programs: &ProgramSet,
-    land: &Land,
-    rays: &[TerrainRay],
-    pixel_angle: f32,
-    path: RayPath,
-) -> Result<Vec<TerrainHit>, Error> {
-    for (i, ray) in rays.iter().enumerate() {
-        ray.check(i)?;
-    }
-    if !(pixel_angle.is_finite() && pixel_angle > 0.0) {
-        return Err(Error::OutOfDomain {
-            name: "pixel_angle".to_owned(),
-            value: pixel_angle.to_string(),
-            domain: "finite and above 0 rad".to_owned(),
-        });
-    }
-    if land.field.on_sphere() {
-        return super::globe_rays::hits(gpu, programs, land, rays, pixel_angle, path);
-    }
-    let (device, queue) = (&gpu.device, &gpu.queue);
-    let farthest = rays.iter().map(|r| r.far.min(1e6)).fold(1000.0, f64::max);
-    // A texel about as wide as a pixel.
-    let texels = match 3.5 / f64::from(pixel_angle) {
-        n if n <= 300.0 => 256,
-        n if n <= 700.0 => 512,
-        _ => 1024,
-    };
-    let options = ClipmapOptions {
-        texels,
-        reach: farthest,
-        ..ClipmapOptions::default()
-    };
-    let fast = path == RayPath::Fast;
-    let mut clipmap = if fast {
-        Some(Clipmap::new(device, programs, land, &options, false)?)
-    } else {
-        None
-    };
-    let field = land.field.prepare::<f32>()?;
-    let mut relief = Relief::new(device, if fast { None } else { field.map() })?;
-    let _ = relief.upload(queue);
-    let features: &[&str] = if fast { &["TERRAIN_FAST"] } else { &[] };
-    let constants = [
-        ("FIELD_KIND", f64::from(land.field.kind.number())),
-        ("MAX_MARCHING_STEPS", 4000.0),
-        ("REFINE_STEPS", 2.0),
-    ];
-    // The march has no steps of refinement.
-    let constants = &constants[..if fast { 3 } else { 2 }];
-    let (pipeline, layouts) = compute(device, programs, "terrain_rays", features, constants)?;
-    use wgpu::BufferUsages as Usage;
-    let buffer = |label, size: usize, usage| {
-        device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size: size as u64,
-            usage,
-            mapped_at_creation: false,
-        })
-    };
-    let uniform = Usage::UNIFORM | Usage::COPY_DST;
-    let field_buffer = buffer("veduta field", FieldBlock::SIZE, uniform);
-    let planet_buffer = buffer("veduta planet", PlanetBlock::SIZE, uniform);
-    let mut hits = vec![TerrainHit::MISS; rays.len()];
-    let mut at = 0;
-    while at < rays.len() {
-        let eye = rays[at].origin;
-        let count = rays[at..]
-            .iter()
-            .take(1 << 14)
-            .take_while(|r| r.origin == eye)
-            .count();
-        let part = &rays[at..at + count];
-        let block = field.block(field.place(eye)).to_bytes();
-        queue.write_buffer(&field_buffer, 0, &block);
-        let mut encoder = device.create_command_encoder(&Default::default());
-        let planet = PlanetBlock {
-            ground_radius: land.planet_radius as f32,
-            eye_altitude: eye.altitude() as f32,
-        };
-        queue.write_buffer(&planet_buffer, 0, &planet.to_bytes());
-        let mut rows = Vec::with_capacity(32 * count);
-        for ray in part {
-            let [x, y, z] = ray.dir.map(|c| c as f32);
-            let far = ray.far.min(1e6) as f32;
-            for number in [0.0, 0.0, 0.0, far, x, y, z, pixel_angle] {
-                rows.extend(number.to_le_bytes());
-            }
-        }
-        let exchange = Exchange::new(device, queue, &rows, 48 * count);
-        let groups = if let Some(clipmap) = &mut clipmap {
-            let above = nearest_ground(&field, eye);
-            let gaze = Gaze {
-                least: 0.35 * f64::from(pixel_angle) * above,
-                near: above,
-                far: farthest,
-                azimuths: [0.0, std::f64::consts::TAU],
-                sun: None,
-            };
-            let _ = clipmap.prepare(queue, &mut encoder, eye, &gaze);
-            let view = wgpu::BindingResource::TextureView;
-            let [heights, sectors, places] = &clipmap.views;
-            [
-                group(
-                    device,
-                    &layouts[0],
-                    &[
-                        field_buffer.as_entire_binding(),
-                        clipmap.clip().as_entire_binding(),
-                    ],
-                ),
-                group(
-                    device,
-                    &layouts[1],
-                    &[
-                        exchange.input.as_entire_binding(),
-                        view(heights),
-                        view(sectors),
-                        view(places),
-                        wgpu::BindingResource::Sampler(&clipmap.wrapping),
-                        view(clipmap.relief()),
-                    ],
-                ),
-                group(device, &layouts[2], &[exchange.output.as_entire_binding()]),
-            ]
-        } else {
-            [
-                group(
-                    device,
-                    &layouts[0],
-                    &[
-                        field_buffer.as_entire_binding(),
-                        planet_buffer.as_entire_binding(),
-                    ],
-                ),
-                group(
-                    device,
-                    &layouts[1],
-                    &[
-                        exchange.input.as_entire_binding(),
-                        wgpu::BindingResource::TextureView(&relief.view),
-                    ],
-                ),
-                group(device, &layouts[2], &[exchange.output.as_entire_binding()]),
-            ]
-        };
-        let workgroups = count.div_ceil(64) as u32;
-        let data = exchange.run(device, queue, encoder, &pipeline, &groups, workgroups)?;
-        for (i, row) in data.chunks_exact(48).enumerate() {
-            let bits = |k: usize| [row[k], row[k + 1], row[k + 2], row[k + 3]];
-            let number = |k: usize| f64::from(f32::from_le_bytes(bits(k)));
-            let capped = i32::from_le_bytes(bits(32)) < 0;
-            hits[at + i] = if number(0) < 0.0 {
-                TerrainHit {
-                    capped,
-                    ..TerrainHit::MISS
-                }
-            } else {
-                TerrainHit {
-                    distance: number(0),
-                    normal: [number(16), number(20), number(24)],
-                    height: number(28),
-                    capped,
-                }
-            };
-        }
-        at += count;
-    }
-    Ok(hits)
 }
 
 /// Altitude at a distance along a ray from altitude `start`, without cancellation; `mu` is its zenith cosine there.
@@ -275,14 +103,84 @@ pub(super) struct Search {
     pub pixel_angle: f64,
     /// Least step (m).
     pub least: f64,
+    /// No slope is steeper while so many octaves count, of a first one with cells of `wavelength` metres.
+    pub steep: [f64; 17],
+    pub wavelength: f64,
+    /// What of a metre of the ray goes along the ground at most.
+    pub level: f64,
+}
+
+/// Steps of a search at most.
+const MOST_STEPS: usize = 1 << 18;
+
+/// What a search found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Found {
+    /// Distance of the ground (m).
+    pub distance: Option<f64>,
+    /// Whether the steps did not suffice.
+    pub capped: bool,
+}
+
+impl Found {
+    /// The hit, from what is found at a distance.
+    pub fn hit(self, at: impl Fn(f64) -> TerrainHit) -> TerrainHit {
+        TerrainHit {
+            capped: self.capped,
+            ..self.distance.map_or(TerrainHit::MISS, at)
+        }
+    }
+}
+
+/// Where a ray that ran out of steps most likely meets the ground, as `veduta::terrain::clipmap::likely_end` says.
+fn likely_end(start: f64, radius: f64, mu: f64, t: f64, clearance: f64, far: f64) -> Option<f64> {
+    let below = altitude_along(start, radius, mu, t) - clearance;
+    let square = mu * mu;
+    let lowest = start - radius * square / (1.0 + (1.0 - square).max(0.0).sqrt());
+    let fall = -(mu + t / radius);
+    let close = clearance < 0.02 * t;
+    if close {
+        return Some(t.min(far));
+    }
+    (fall > 0.0 && lowest < below).then(|| (t + clearance.max(0.0) / fall.max(1e-3)).min(far))
 }
 
 impl Search {
-    /// The first distance at which the clearance is gone, by steps of half a footprint and bisection.
+    /// Distance at which the ray comes down to the highest ground; `None` when it does not.
+    pub fn entry(&self) -> Option<f64> {
+        let mut t = 0.0;
+        while t < self.far {
+            let above = altitude_along(self.start, self.radius, self.mu, t) - self.top;
+            if above <= 0.0 {
+                return Some(t);
+            }
+            let rise = self.rise(t);
+            if rise >= 0.0 {
+                return None;
+            }
+            // Altitude is convex: the tangent comes down to the highest ground before the ray does.
+            t += (above / -rise).max(1e-3);
+        }
+        None
+    }
+
+    /// Zenith cosine of the ray at a distance.
+    fn rise(&self, t: f64) -> f64 {
+        let q = t * (t + 2.0 * self.radius * self.mu);
+        (self.radius * self.mu + t) / (self.radius * self.radius + q).max(1.0).sqrt()
+    }
+
+    /// No slope of the field is steeper where a sample is at least so wide (m).
+    fn steepest(&self, footprint: f64) -> f64 {
+        let count = (2.0 * self.wavelength / footprint.max(1e-9)).log2().ceil();
+        self.steep[count.clamp(0.0, 16.0) as usize] * (1.0 + 8.0 * self.pixel_angle)
+    }
+
+    /// The first distance at which the clearance is gone, by steps of half a footprint, or longer ones where the slope's bound shows the ray clear, and bisection.
     ///
     /// # Errors
     /// [`Error::OutOfDomain`] for a least step that is not above 0 and an angle that is below it.
-    pub fn first(&self, clearance: impl Fn(f64) -> f64) -> Result<Option<f64>, Error> {
+    pub fn first(&self, clearance: impl Fn(f64) -> f64) -> Result<Found, Error> {
         for (name, value) in [("least", self.least), ("pixel_angle", self.pixel_angle)] {
             if !(value.is_finite() && value >= 0.0 && (name != "least" || value > 0.0)) {
                 return Err(Error::OutOfDomain {
@@ -300,25 +198,45 @@ impl Search {
             far,
             pixel_angle,
             least,
+            ..
         } = self;
+        let found = |distance| Found {
+            distance,
+            capped: false,
+        };
         let mut t = 0.0;
-        if clearance(0.0) <= 0.0 {
-            return Ok(Some(0.0));
+        let mut left = clearance(0.0);
+        if left <= 0.0 {
+            return Ok(found(Some(0.0)));
         }
+        let mut steps = 0;
         while t < far {
+            if steps == MOST_STEPS {
+                return Ok(Found {
+                    distance: likely_end(start, radius, mu, t, left, far),
+                    capped: true,
+                });
+            }
+            steps += 1;
             let above = altitude_along(start, radius, mu, t) - top;
+            let rise = self.rise(t);
             if above > 0.0 {
-                let q = t * (t + 2.0 * radius * mu);
-                let rise = (radius * mu + t) / (radius * radius + q).max(1.0).sqrt();
                 if rise >= 0.0 {
-                    return Ok(None);
+                    return Ok(found(None));
                 }
                 // Altitude is convex: the tangent comes down to the highest ground before the ray does.
                 t += (above / -rise).max(1e-3);
+                left = 0.0;
                 continue;
             }
-            let next = (t + (0.5 * pixel_angle * t).max(least)).min(far);
-            if clearance(next) <= 0.0 {
+            let half = 0.5 * pixel_angle * t;
+            // From here on footprints grow and the ray bends upwards: neither makes it come down faster.
+            let fall = (self.steepest(2.0 * half) * self.level - rise).max(1e-9);
+            // Some for what rounding of heights in `f32` may hide.
+            let safe = (left - 0.01) / fall;
+            let next = (t + half.max(least).max(safe)).min(far);
+            left = clearance(next);
+            if left <= 0.0 {
                 let (mut clear, mut below) = (t, next);
                 for _ in 0..60 {
                     let middle = 0.5 * (clear + below);
@@ -331,33 +249,63 @@ impl Search {
                         clear = middle;
                     }
                 }
-                return Ok(Some(clear));
+                return Ok(found(Some(clear)));
             }
             t = next;
         }
-        Ok(None)
+        Ok(found(None))
     }
 }
 
 impl<T: Real> Prepared<T> {
-    /// The first place where a ray meets the field as its footprint filters it, by bracketing: steps of half a footprint, at least `least` metres, and
-    /// bisection. A stretch below the ground that is shorter than a step may be missed; nothing else can be. Above `top` (m) there is no ground, see
-    /// [`super::HeightField::bounds`].
+    /// The search along a ray whose numbers are checked.
+    pub(super) fn search(
+        &self,
+        planet_radius: f64,
+        ray: &TerrainRay,
+        pixel_angle: f64,
+        least: f64,
+    ) -> Search {
+        let start = ray.origin.altitude();
+        let bounds = self.bounds();
+        Search {
+            start,
+            radius: planet_radius + start,
+            mu: ray.dir[1],
+            top: bounds.map_or(2e4, |b| b.maximum),
+            far: ray.far.min(TerrainRay::FARTHEST),
+            pixel_angle,
+            least,
+            steep: bounds.map_or([1e30; 17], |b| b.ladder(self.kind())),
+            wavelength: self.lattice(),
+            level: ray.dir[0].hypot(ray.dir[2]),
+        }
+    }
+
+    /// The first place where a ray meets the field as its footprint filters it, by bracketing: steps of half a footprint, at least `least` metres, longer where bounds show the ray clear, and
+    /// bisection. A stretch below the ground that is shorter than half a footprint may be missed; nothing else can be. A ray that has taken 2^18 steps (about half a second) ends as
+    /// [`TerrainHit::capped`]. [`Land::ray_hits`] is the same for a whole land.
     ///
     /// # Errors
-    /// As [`TerrainRay::check`].
+    /// As [`TerrainRay::check`]; [`Error::OutOfDomain`] for an angle that is below 0, a least step that is not above it, and a program's own function, which the processor does not know.
     pub fn ray_hit(
         &self,
         planet_radius: f64,
-        top: f64,
         ray: &TerrainRay,
         pixel_angle: f64,
         least: f64,
     ) -> Result<TerrainHit, Error> {
         ray.check(0)?;
+        if let Kind::Own { .. } = self.kind() {
+            return Err(Error::OutOfDomain {
+                name: "field.kind".to_owned(),
+                value: "Own".to_owned(),
+                domain: "a kind that the processor knows; ray_hits asks the device".to_owned(),
+            });
+        }
+        let search = self.search(planet_radius, ray, pixel_angle, least);
+        let (start, radius) = (search.start, search.radius);
         let eye = self.place(ray.origin);
-        let start = ray.origin.altitude();
-        let radius = planet_radius + start;
         let altitude = |t: f64| altitude_along(start, radius, ray.dir[1], t);
         let ground = |t: f64| {
             let offset = [ray.dir[0] * t, ray.dir[2] * t].map(T::of);
@@ -382,15 +330,47 @@ impl<T: Real> Prepared<T> {
                 capped: false,
             }
         };
-        let search = Search {
-            start,
-            radius,
-            mu: ray.dir[1],
-            top,
-            far: ray.far.min(1e7),
-            pixel_angle,
-            least,
-        };
-        Ok(search.first(clearance)?.map_or(TerrainHit::MISS, hit))
+        Ok(search.first(clearance)?.hit(hit))
+    }
+}
+
+impl Land {
+    /// Where rays meet the land, on the processor in `f64`, on the plane and over a ball: [`Prepared::ray_hit`] and [`Globe::ray_hit`] of the field, which is prepared once. Steps are at least 5 cm.
+    ///
+    /// ```
+    /// use veduta::WorldPos;
+    /// use veduta::terrain::{Land, TerrainRay};
+    /// let land = Land::named("hills")?;
+    /// let origin = WorldPos::from_metres([0.0, 3000.0, 0.0].into());
+    /// let down = TerrainRay { origin, dir: [0.0, -1.0, 0.0], far: 1e4 };
+    /// let hit = land.ray_hits(&[down], 0.001)?[0];
+    /// assert!((3000.0 - hit.distance - hit.height).abs() < 0.1);
+    /// # Ok::<(), veduta::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Land::check`] and [`TerrainRay::check`], with the ray's index; as [`Prepared::ray_hit`].
+    ///
+    /// [`Globe::ray_hit`]: super::Globe::ray_hit
+    pub fn ray_hits(
+        &self,
+        rays: &[TerrainRay],
+        pixel_angle: f64,
+    ) -> Result<Vec<TerrainHit>, Error> {
+        self.check()?;
+        for (i, ray) in rays.iter().enumerate() {
+            ray.check(i)?;
+        }
+        if self.field.on_sphere() {
+            let globe = self.globe::<f64>()?;
+            return rays
+                .iter()
+                .map(|ray| globe.ray_hit(ray, pixel_angle, 0.05))
+                .collect();
+        }
+        let field = self.field.prepare::<f64>()?;
+        rays.iter()
+            .map(|ray| field.ray_hit(self.planet_radius, ray, pixel_angle, 0.05))
+            .collect()
     }
 }

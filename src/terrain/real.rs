@@ -22,6 +22,8 @@ pub trait Real:
     fn wide(self) -> f64;
     /// Square root of a number that is not negative.
     fn root(self) -> Self;
+    /// Two numbers whose sum it is, the first of so few digits that it may be multiplied by a whole number below 32,768 exactly.
+    fn parts(self) -> (Self, Self);
     /// Largest whole number that is not above.
     fn whole(self) -> Self;
     /// The vector of gradient noise that a random word stands for; see `veduta::noise::gradient`.
@@ -54,6 +56,10 @@ impl Real for f32 {
     }
     fn root(self) -> f32 {
         self.sqrt()
+    }
+    fn parts(self) -> (f32, f32) {
+        let high = f32::from_bits(self.to_bits() & 0xffff_8000);
+        (high, self - high)
     }
     fn whole(self) -> f32 {
         self.floor()
@@ -91,6 +97,9 @@ impl Real for f64 {
     }
     fn root(self) -> f64 {
         self.sqrt()
+    }
+    fn parts(self) -> (f64, f64) {
+        (self, 0.0)
     }
     fn whole(self) -> f64 {
         self.floor()

@@ -14,7 +14,7 @@ use crate::view::View;
 /// Tiles of the picture: 16 across and 12 down.
 const TILES: u32 = 16 * 12;
 
-/// Irradiances on the ground, in the picture's own unit. A host that has an atmosphere takes them from its `SkyQuery`.
+/// Irradiances on the ground, in the picture's own unit. A host that has an atmosphere takes them [from it](TerrainLights::from_sky).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TerrainLights {
     /// Of the sun on a plane across its direction, behind the air.
@@ -60,7 +60,8 @@ impl TerrainLights {
 /// Choices that are made once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TerrainOptions {
-    /// The quality: `low` bakes half as finely and has one fractal in its rock.
+    /// The quality. Of its keys these are read: CLIP_STEPS, CLIP_TEXELS, REFINE_STEPS and TEXTURE_LOW_QUALITY on the plane, GLOBE_STEPS and GLOBE_STEPS_SHADOW over a ball; all others are those of
+    /// other systems, and of the landscape's own march.
     pub preset: Preset,
     /// The ground.
     pub land: Land,
@@ -68,7 +69,8 @@ pub struct TerrainOptions {
     pub far: f64,
     /// Sectors in which the horizons around a place take light off the sky (ambient occlusion), in [0, 16]; 0 leaves all of it. Nothing comes of it over a ball.
     pub sky_sectors: u32,
-    /// Texels of a level's side, see [`ClipmapOptions::texels`]; 0 leaves it to the preset: 512, or 256 for `low`.
+    /// Texels of a side of each level of baked heights: 128, 256, 512 or 1024. A texel is about as wide as a pixel where it is used when this is 3.5 over the angle of a pixel. 0 leaves it to the
+    /// preset's CLIP_TEXELS: 512, or 256 for `low`. Nothing comes of it over a ball, where nothing is baked.
     pub texels: u32,
 }
 
@@ -200,12 +202,23 @@ impl PlaneTerrain {
         }
         let output = output_of(targets.color_format)?;
         let settings = Settings::resolve(programs, &options.preset, None, &[])?;
-        let low = settings.number("TEXTURE_LOW_QUALITY").unwrap_or(0.0) != 0.0;
-        let texels = match options.texels {
-            0 if low => 256,
-            0 => 512,
-            n => n,
+        let number = |key: &str, or: f64| settings.number(key).unwrap_or(or);
+        let (name, texels) = match options.texels {
+            0 => ("CLIP_TEXELS", number("CLIP_TEXELS", 512.0) as u32),
+            n => ("terrain.texels", n),
         };
+        let fault = |name: &str, value: String, domain: &str| Error::OutOfDomain {
+            name: name.to_owned(),
+            value,
+            domain: domain.to_owned(),
+        };
+        if !matches!(texels, 128 | 256 | 512 | 1024) {
+            return Err(fault(name, texels.to_string(), "128, 256, 512 or 1024"));
+        }
+        if !(100.0..=4e6).contains(&options.far) {
+            let value = options.far.to_string();
+            return Err(fault("terrain.far", value, "in [100, 4e6] m on the plane"));
+        }
         let clipmap = Clipmap::new(
             device,
             programs,
@@ -220,9 +233,9 @@ impl PlaneTerrain {
         let constants = [
             ("FIELD_KIND", f64::from(options.land.field.kind.number())),
             ("OUTPUT", output),
-            ("MAX_MARCHING_STEPS", if low { 250.0 } else { 500.0 }),
-            ("REFINE_STEPS", if low { 0.0 } else { 2.0 }),
-            ("ROCK_CHEAP", f64::from(u8::from(low))),
+            ("CLIP_STEPS", number("CLIP_STEPS", 500.0)),
+            ("REFINE_STEPS", number("REFINE_STEPS", 2.0)),
+            ("ROCK_CHEAP", number("TEXTURE_LOW_QUALITY", 0.0)),
             ("SKY_SECTORS", f64::from(options.sky_sectors)),
         ];
         let (pipeline, layouts) = surface_pipeline(

@@ -10,6 +10,10 @@ mod host_app;
 #[path = "../../examples/sky_over_host.rs"]
 mod sky_over_host;
 
+#[allow(dead_code)]
+#[path = "../../examples/terrain_and_mesh.rs"]
+mod terrain_and_mesh;
+
 #[test]
 fn host_app_draws_a_landscape_in_under_80_lines() {
     let source = include_str!("../../examples/host_app.rs");
@@ -107,4 +111,43 @@ fn earth_and_moon_shows_the_limb_before_the_stars() {
     let moon: Vec<usize> = (20..45).filter(|x| bright(*x) > 60).collect();
     println!("{moon:?}");
     assert!(!moon.is_empty() && moon.len() < 12);
+}
+
+#[test]
+fn terrain_and_mesh_hides_what_stands_behind_the_ground() {
+    use terrain_and_mesh::{Tower, draw, row};
+    let size = [96, 54];
+    let red = |pixels: &[u8]| {
+        pixels
+            .chunks(4)
+            .filter(|p| f64::from(p[0]) > 2.0 * f64::from(p[1]) && p[0] > 40)
+            .count()
+    };
+    let empty = draw(size, &[]).unwrap();
+    let shown = draw(size, &row()).unwrap();
+    let sunk: Vec<Tower> = row()
+        .into_iter()
+        .map(|t| Tower { rise: -400.0, ..t })
+        .collect();
+    let behind = draw(size, &sunk).unwrap();
+    let apart = |a: &[u8], b: &[u8]| a.chunks(4).zip(b.chunks(4)).filter(|(p, q)| p != q).count();
+    println!(
+        "{} red pixels, {} differ; sunk: {} red, {} differ",
+        red(&shown),
+        apart(&shown, &empty),
+        red(&behind),
+        apart(&behind, &empty)
+    );
+    assert!(red(&empty) == 0 && red(&shown) > 20);
+    assert!(apart(&shown, &empty) < 96 * 54 / 4);
+    assert_eq!(behind, empty);
+    // Sky above, ground below.
+    let mean = |y: usize, c: usize| -> u32 {
+        (0..96)
+            .map(|x| u32::from(empty[4 * (96 * y + x) + c]))
+            .sum::<u32>()
+            / 96
+    };
+    assert!(mean(1, 2) > mean(1, 0) + 20, "blue");
+    assert!(mean(52, 2) < mean(1, 2));
 }

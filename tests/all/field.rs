@@ -74,7 +74,7 @@ fn footprint(random: &mut Random) -> f32 {
 }
 
 #[test]
-fn the_device_is_the_processor_to_four_places_and_truth_to_thirty_millimetres() {
+fn the_device_is_the_processor_to_its_last_places_and_truth_to_thirty_millimetres() {
     let mut random = Random(1);
     for (name, field) in fields() {
         let single = field.prepare::<f32>().unwrap();
@@ -104,10 +104,9 @@ fn the_device_is_the_processor_to_four_places_and_truth_to_thirty_millimetres() 
             "{name}: {same} of {total} bit by bit, {worst:.1} places, {:.1} mm",
             1e3 * off
         );
-        // The device multiplies the weights of the hybrid and the powers of the mix in another order: 9 and 5 places were measured, a millimetre.
+        // 4 are the aim. The hybrid misses it with 9 (a millimetre): where the noise is added to something at once, the driver's compiler takes it in another order, which shows with one octave.
         let bar = match name {
             "hybrid" => 12.0,
-            "mix" => 8.0,
             _ => 4.0,
         };
         assert!(worst <= bar, "{name}: {worst} places");
@@ -336,34 +335,132 @@ fn slopes_that_the_filter_takes_off_are_accounted_for() {
     }
 }
 
+/// Places far off, found by whole numbers: the lattice cell and the fraction of positions of which `f64` would know no metre.
 #[test]
 fn nothing_changes_far_from_the_origin() {
     let mut random = Random(7);
-    for (_, field) in fields() {
-        // The lattice repeats after 2^32 cells, so that the same content lies at the origin and far from it.
-        let field = HeightField {
-            wavelength: 64.0,
-            amplitude: 20.0,
-            ..field
-        };
-        let period = (field.lattice_wavelength() as i64) << 32;
+    for (name, field) in fields() {
         let single = field.prepare::<f32>().unwrap();
-        let places: Vec<WorldPos> = (0..500).map(|_| position(&mut random, 1e5)).collect();
-        let far: Vec<WorldPos> = places
-            .iter()
-            .map(|p| WorldPos {
-                cell: p.cell + veduta::glam::I64Vec3::new(period, 0, -3 * period),
-                ..*p
+        let double = field.prepare::<f64>().unwrap();
+        let lattice = field.lattice_wavelength();
+        assert_eq!(lattice.fract(), 0.0);
+        let period = (lattice as i128) << 24;
+        let places: Vec<WorldPos> = (0..300)
+            .map(|_| {
+                let mut p = position(&mut random, 1e5);
+                // Not a multiple of any wavelength.
+                p.cell +=
+                    veduta::glam::I64Vec3::new(300_000_000_000_000_123, 0, -77_777_777_777_777_777);
+                p
             })
             .collect();
-        let near = heights(gpu(), veduta::programs(), &field, &places, 0.5).unwrap();
-        assert_eq!(
-            near,
-            heights(gpu(), veduta::programs(), &field, &far, 0.5).unwrap()
-        );
-        for (p, q) in places.iter().zip(&far) {
-            assert_eq!(single.ground(*p, 0.5), single.ground(*q, 0.5));
+        let found = heights(gpu(), veduta::programs(), &field, &places, 0.5).unwrap();
+        let (mut worst, mut near) = (0_f64, 0_f64);
+        for (p, g) in places.iter().zip(&found) {
+            let axis = |k: usize| {
+                // Fractions are multiples of 2^-24.
+                let at =
+                    (i128::from(p.cell[k]) << 24) + (f64::from(p.frac[k]) * 16_777_216.0) as i128;
+                let cell = at.div_euclid(period).rem_euclid(1 << 32) as u32;
+                (
+                    cell.cast_signed(),
+                    at.rem_euclid(period) as f64 / period as f64,
+                )
+            };
+            let ((x, u), (z, v)) = (axis(0), axis(2));
+            let place = Place {
+                cell: [x, z],
+                frac: [u, v],
+            };
+            let truth = reference::ground(
+                &members(&field, &single, place),
+                field.kind.number(),
+                [0.0; 2],
+                0.5,
+            );
+            worst = worst.max((f64::from(g.height) - truth.height).abs());
+            near = near.max((double.ground(*p, 0.5).height - truth.height).abs());
         }
+        println!(
+            "{name}: device {:.1} mm, f64 {:.2} mm",
+            1e3 * worst,
+            1e3 * near
+        );
+        assert!(worst <= 0.03 && near <= 0.01, "{name}");
+    }
+}
+
+/// Heights at offsets from the eye, as rays and pictures ask for them.
+#[test]
+fn heights_a_hundred_kilometres_from_the_eye_are_true_to_thirty_millimetres() {
+    let mut random = Random(8);
+    for (name, field) in fields() {
+        let single = field.prepare::<f32>().unwrap();
+        let double = field.prepare::<f64>().unwrap();
+        let eye = position(&mut random, 1e8);
+        let block = single.block(single.place(eye));
+        let four = |v: [f32; 4]| format!("vec4f({:e}, {:e}, {:e}, {:e})", v[0], v[1], v[2], v[3]);
+        let prelude = format!(
+            "fn land() -> Field {{ return Field(vec2i({}, {}), vec2f({:e}, {:e}), {:e}, {:e}, {:e}, {:e}, {:e}, {:e}, {}, {}u, {}, {}); }}",
+            block.cell[0],
+            block.cell[1],
+            block.frac[0],
+            block.frac[1],
+            block.wavelength,
+            block.amplitude,
+            block.base,
+            block.fall,
+            block.shape,
+            block.detail,
+            block.octaves,
+            block.seed,
+            four(block.mean),
+            four(block.lost),
+        );
+        let expression = format!(
+            "ground_at(land(), {}, vec2f(in.f[0], in.f[1]), in.f[2]).height",
+            field.kind.number()
+        );
+        let rows: Vec<[f32; 3]> = (0..4000)
+            .map(|i| {
+                let away = 1e5 * (i as f32 / 4000.0);
+                let (sine, cosine) = random.between(0.0, std::f32::consts::TAU).sin_cos();
+                [
+                    away * cosine,
+                    away * sine,
+                    if i % 2 == 0 { 0.0 } else { away * 0.001 },
+                ]
+            })
+            .collect();
+        let bits: Vec<u32> = rows.iter().flatten().map(|v| v.to_bits()).collect();
+        let found = crate::common::evaluator(
+            &["veduta::terrain::field::{Field, ground_at}"],
+            &prelude,
+            &expression,
+            3,
+        )
+        .run(&bits)
+        .unwrap();
+        let (mut off, mut apart, mut same) = (0_f64, 0_f64, 0);
+        for ([x, z, width], g) in rows.iter().zip(&found) {
+            let at = [f64::from(*x), f64::from(*z)];
+            let truth = double.ground_from(double.place(eye), at, f64::from(*width));
+            let twin = single.ground_from(single.place(eye), [*x, *z], *width);
+            off = off.max((g - truth.height).abs());
+            let size = g.abs().max(field.amplitude);
+            let gap = (g - f64::from(twin.height)).abs();
+            apart = apart.max(gap / (0.5 * f64::from(f32::EPSILON) * size));
+            same += i32::from(*g == f64::from(twin.height));
+        }
+        println!(
+            "{name}: {:.1} mm off, {same} of {} as on the processor, {:.1} places apart",
+            1e3 * off,
+            rows.len(),
+            apart
+        );
+        assert!(off <= 0.030, "{name}: {off} m");
+        let bar = if name == "hybrid" { 12.0 } else { 4.0 };
+        assert!(apart <= bar, "{name}: {apart} places");
     }
 }
 
@@ -409,6 +506,7 @@ fn files_make_fields_and_faults_name_what_is_wrong() {
         kind: Kind::Own {
             gain: 2.0,
             smoothness: 0.0,
+            bounds: None,
         },
         ..good
     };

@@ -27,6 +27,7 @@ mod periodic;
 mod phase;
 mod planet;
 mod probe;
+mod query;
 mod reference;
 mod simplex;
 mod sky;

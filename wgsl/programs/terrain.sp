@@ -119,9 +119,10 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 
 override FIELD_KIND: i32 = 2;
 override OUTPUT: i32 = 0;
-override MAX_MARCHING_STEPS: i32 = 200;
+// Most steps of a ray.
+override CLIP_STEPS: i32 = 500;
 // Steps from the baked ground to the field.
-override REFINE_STEPS: i32 = 1;
+override REFINE_STEPS: i32 = 2;
 // Whether the rock has one fractal instead of four.
 override ROCK_CHEAP: i32 = 0;
 // Sectors in which horizons take light off the sky; 0: none.
@@ -150,8 +151,8 @@ fn shown(radiance: vec3<f32>, pixel: vec2<f32>) -> vec4<f32> {
 fn draw(in: Corner) -> Shown {
     let dir = normalize(in.ray);
     let angle = draw_view.pixel_angle;
-    let hit = clip_hit(heights, wrapping, sectors, places, clip, dir, draw_view.far, MAX_MARCHING_STEPS);
-    let met = likely_distance(clip, dir, hit, draw_view.far, MAX_MARCHING_STEPS);
+    let hit = clip_hit(heights, wrapping, sectors, places, clip, dir, draw_view.far, CLIP_STEPS);
+    let met = likely_distance(clip, dir, hit, draw_view.far, CLIP_STEPS);
     // Where nothing is met the rest takes no rounds of any loop.
     let is_met = met >= 0.0;
     let pixel = select(1e30, angle, is_met);

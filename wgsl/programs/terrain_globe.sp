@@ -100,8 +100,8 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 
 override FIELD_KIND: i32 = 2;
 override OUTPUT: i32 = 0;
-override MAX_MARCHING_STEPS: i32 = 200;
-override MAX_MARCHING_STEPS_SHADOW: i32 = 60;
+override GLOBE_STEPS: i32 = 600;
+override GLOBE_STEPS_SHADOW: i32 = 40;
 
 const INVERSE_PI: f32 = 0.31830988618;
 
@@ -138,7 +138,7 @@ fn lights_at(mu: f32) -> ThreeLights {
 fn draw(in: Corner) -> Shown {
     let dir = normalize(in.ray);
     let angle = draw_view.pixel_angle;
-    let hit = globe_hit(globe, FIELD_KIND, dir, 0.0, draw_view.far, angle, MAX_MARCHING_STEPS);
+    let hit = globe_hit(globe, FIELD_KIND, dir, 0.0, draw_view.far, angle, GLOBE_STEPS);
     let is_met = hit.distance >= 0.0;
     let point = dir * max(hit.distance, 0.0);
     // Where nothing is met the rest takes no rounds of any loop.
@@ -157,7 +157,7 @@ fn draw(in: Corner) -> Shown {
     // The ball falls away behind the terminator: farther than what its highest ground sees over it there is no sun.
     let facing = dot(hit.normal, draw_view.to_sun) + sqrt(lost);
     let dusk = -sqrt(2.0 * max(globe.high - globe.low, 0.0) / globe.ground_radius) - draw_view.sun_width;
-    let rounds = select(0, MAX_MARCHING_STEPS_SHADOW, is_met && facing > 0.0 && mu > dusk);
+    let rounds = select(0, GLOBE_STEPS_SHADOW, is_met && facing > 0.0 && mu > dusk);
     let light = globe_shadow(globe, FIELD_KIND, point, draw_view.to_sun, draw_view.sun_width, footprint, rounds);
     let lit = select(0.0, light, mu > dusk);
     // The frame of the place: east, up, and across both.

@@ -7,6 +7,8 @@ Where given rays meet a ball, one invocation a ray: the textbook march, or steps
 #import veduta::terrain::globe::{Globe, globe_altitude, globe_at, globe_up}
 #ifdef TERRAIN_FAST
 #import veduta::terrain::orbit::{globe_hit}
+#else
+#import veduta::terrain::clipmap::{likely_end}
 #endif
 
 override FIELD_KIND: i32 = 2;
@@ -55,10 +57,14 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     var t = 0.0;
     var distance = -1.0;
     var steps = -1;
+    var reached = 0.0;
+    var last = 0.0;
     for (var i = 0; i < MAX_MARCHING_STEPS; i++) {
         let at = ray.dir * t;
         let altitude = globe_altitude(globe, at);
         let clearance = altitude - globe_at(globe, FIELD_KIND, at, ray.pixel_angle * (ray.near + t)).height;
+        reached = t;
+        last = clearance;
         if clearance < MARCH_EPSILON * 0.001 * (ray.near + t) {
             distance = t;
             steps = i + 1;
@@ -70,6 +76,9 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
             break;
         }
     }
+    // Out of steps: where the ground most likely is.
+    let mu = dot(globe.up, ray.dir);
+    distance = select(distance, likely_end(globe.ground_radius, globe.eye_altitude, mu, reached, last, ray.far), steps < 0);
     let at = ray.dir * max(distance, 0.0);
     let ground = globe_at(globe, FIELD_KIND, at, ray.pixel_angle * (ray.near + max(distance, 0.0)));
     let share = globe.ground_radius / (globe.ground_radius + ground.height);

@@ -20,8 +20,6 @@ struct Clip {
     spacing: f32,
     /// Half the width of what a level serves, in its texels.
     reach: f32,
-    /// No baked height is above [m].
-    top: f32,
     /// Texels of a level's side, a power of two.
     texels: i32,
     /// The finest level that is baked.
@@ -206,24 +204,32 @@ fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_
     return hit;
 }
 
-/// Distance at which a ray that ran out of steps most likely meets the ground; that of the hit if there is one, and -1 for what most likely is sky. A ray that is close to the ground has almost met
-/// it; one that would come down to the height of the ground below it meets it where it does.
+/// Distance at which a ray that ran out of steps most likely meets the ground, from how far it came and its clearance there; -1 for what most likely is sky. `mu` is the ray's zenith cosine at the
+/// eye. A ray that is close to the ground has met it; one that would come down to the height of the ground below it meets it where it does.
+///
+/// internal
+fn likely_end(ground_radius: f32, eye_altitude: f32, mu: f32, reached: f32, clearance: f32, far: f32) -> f32 {
+    let radius = ground_radius + eye_altitude;
+    let t = reached;
+    let q = t * (t + 2.0 * radius * mu);
+    let below = eye_altitude + q / (radius + sqrt(max(radius * radius + q, 0.0))) - clearance;
+    // Altitude of the place nearest to the planet's centre.
+    let square = mu * mu;
+    let lowest = eye_altitude - radius * square / (1.0 + sqrt(max(1.0 - square, 0.0)));
+    let fall = -(mu + t / radius);
+    let close = clearance < 0.02 * t;
+    let falls = fall > 0.0 && lowest < below;
+    let distance = t + select(max(clearance, 0.0) / max(fall, 1e-3), 0.0, close);
+    return select(-1.0, min(distance, far), close || falls);
+}
+
+/// [`likely_end`] of a ray that ran out of steps; the distance of the hit if there is one.
 ///
 /// internal
 fn likely_distance(clip: Clip, dir: vec3<f32>, hit: ClipHit, far: f32, max_steps: i32) -> f32 {
-    let radius = clip.ground_radius + clip.eye_altitude;
-    let t = hit.reached;
-    let q = t * (t + 2.0 * radius * dir.y);
-    let below = clip.eye_altitude + q / (radius + sqrt(max(radius * radius + q, 0.0))) - hit.clearance;
-    // Altitude of the place nearest to the planet's centre.
-    let square = dir.y * dir.y;
-    let lowest = clip.eye_altitude - radius * square / (1.0 + sqrt(max(1.0 - square, 0.0)));
-    let fall = -(dir.y + t / radius);
-    let close = hit.clearance < 0.02 * t;
-    let falls = fall > 0.0 && lowest < below;
-    let distance = t + select(max(hit.clearance, 0.0) / max(fall, 1e-3), 0.0, close);
     let capped = hit.distance < 0.0 && hit.steps >= max_steps;
-    return select(hit.distance, select(-1.0, min(distance, far), close || falls), capped);
+    let end = likely_end(clip.ground_radius, clip.eye_altitude, dir.y, hit.reached, hit.clearance, far);
+    return select(hit.distance, end, capped);
 }
 
 /// How the ground's shadow is swept: along the axis of the texels nearest to the sun's azimuth, on lines that keep to it.

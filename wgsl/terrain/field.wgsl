@@ -281,19 +281,47 @@ fn mix_sum(field: Field, start: Lattice2d, footprint: f32) -> Ground {
     return Ground(field.base + field.amplitude * value, steepness * slope, steepness * steepness * lost);
 }
 
-/// The program's own function (`veduta::terrain::height::height`), with as many octaves as the footprint leaves and slopes by differences over it.
+/// The program's own function (`veduta::terrain::height::height`) with so many octaves and a share of one more.
+///
+/// internal
+fn own_faded(terrain: Terrain, offset: vec2<f32>, octaves: i32, share: f32) -> f32 {
+    let coarse = own_height(terrain, offset, octaves);
+    if share <= 0.0 {
+        return coarse;
+    }
+    return mix(coarse, own_height(terrain, offset, octaves + 1), share);
+}
+
+/// The program's own function, with as many octaves as the footprint leaves, the last of which fades as those of other kinds do, and slopes by differences over it.
 ///
 /// internal
 fn own_sum(field: Field, offset: vec2<f32>, footprint: f32) -> Ground {
     let width = max(footprint, 1e-3);
-    let octaves = clamp(i32(floor(log2(field.wavelength / width))), 1, field.octaves);
+    let reach = max(field.wavelength / width, 1.0);
+    let whole = i32(floor(log2(reach)));
+    let octaves = clamp(whole, 1, field.octaves);
+    // By how much the cells of the octave after these exceed the footprint.
+    let x = clamp(reach / exp2(f32(whole)) - 1.0, 0.0, 1.0);
+    let share = select(0.0, x * x * (3.0 - 2.0 * x), whole >= 1 && whole < field.octaves);
     let terrain = Terrain(field.cell, field.frac, field.wavelength, field.amplitude, -log2(field.fall), field.shape, field.detail, field.seed);
-    let east = own_height(terrain, offset + vec2<f32>(width, 0.0), octaves);
-    let west = own_height(terrain, offset - vec2<f32>(width, 0.0), octaves);
-    let south = own_height(terrain, offset + vec2<f32>(0.0, width), octaves);
-    let north = own_height(terrain, offset - vec2<f32>(0.0, width), octaves);
-    let middle = own_height(terrain, offset, octaves);
+    let east = own_faded(terrain, offset + vec2<f32>(width, 0.0), octaves, share);
+    let west = own_faded(terrain, offset - vec2<f32>(width, 0.0), octaves, share);
+    let south = own_faded(terrain, offset + vec2<f32>(0.0, width), octaves, share);
+    let north = own_faded(terrain, offset - vec2<f32>(0.0, width), octaves, share);
+    let middle = own_faded(terrain, offset, octaves, share);
     return Ground(field.base + middle, vec2<f32>(east - west, south - north) / (2.0 * width), 0.0);
+}
+
+/// The place on the lattice at an offset from the eye. Whole cells are taken off the offset before it is divided: the wavelength stands in two parts, of which the first times a number of cells
+/// below 32,768 is exact.
+///
+/// internal
+fn field_place(field: Field, offset: vec2<f32>) -> Lattice2d {
+    let whole = floor(offset / field.wavelength);
+    let high = bitcast<f32>(bitcast<u32>(field.wavelength) & 0xffff8000u);
+    let rest = (offset - whole * high) - whole * (field.wavelength - high);
+    let at = split_2d(field.cell, field.frac + rest / field.wavelength);
+    return Lattice2d(at.cell + vec2<i32>(whole), at.frac);
 }
 
 /// The field at a place, filtered by the footprint. `kind` is one of the constants `FIELD_..`; given as an override it costs nothing. Of `FIELD_MAP` this is the detail.
@@ -309,7 +337,7 @@ fn ground_at(field: Field, kind: i32, offset: vec2<f32>, footprint: f32) -> Grou
     if kind == FIELD_OWN {
         return own_sum(field, offset, footprint);
     }
-    let start = split_2d(field.cell, field.frac + offset / field.wavelength);
+    let start = field_place(field, offset);
     if kind == FIELD_MIX {
         return mix_sum(field, start, footprint);
     }

@@ -7,8 +7,8 @@
 //! symbols  relief height [m] and mean square of the slopes, by level · offset place from the eye, (x, z) [m] · footprint width of what one sample stands for [m]
 #define_import_path veduta::terrain::relief
 
-#import veduta::noise::lattice::{Lattice2d, split_2d}
-#import veduta::terrain::field::{Field, Ground, ground_at, FIELD_MAP}
+#import veduta::noise::lattice::{Lattice2d}
+#import veduta::terrain::field::{Field, Ground, ground_at, field_place, FIELD_MAP}
 
 const EDGE_REPEAT: i32 = 0;
 const EDGE_MIRROR: i32 = 1;
@@ -130,7 +130,7 @@ fn land_at(relief: texture_2d<f32>, field: Field, kind: i32, offset: vec2<f32>, 
     if kind != FIELD_MAP {
         return detail;
     }
-    let place = split_2d(field.cell, field.frac + offset / field.wavelength);
+    let place = field_place(field, offset);
     let map = relief_ground(relief, place, field.wavelength, i32(field.shape), footprint);
     return Ground(map.height + detail.height, map.slope + detail.slope, map.lost + detail.lost);
 }

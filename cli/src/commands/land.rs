@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 use std::path::PathBuf;
 
-use veduta::atmosphere::{LightPlace, Sky, SkyComposition, SkyOptions, SkyQuery};
+use veduta::atmosphere::{Sky, SkyComposition, SkyOptions, SkyQuery};
 use veduta::glam::{DQuat, DVec3, Mat4, Vec3};
 use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
 use veduta::view::direction;
@@ -210,40 +210,22 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
         bounce: Vec3::ZERO,
     };
     if let Some(sky) = &mut sky {
-        let atmosphere = sky.tables().atmosphere().clone();
-        let query = SkyQuery::new(device, veduta::programs(), &atmosphere)?;
-        let mut places = vec![to_sun];
+        let query = SkyQuery::new(device, veduta::programs(), sky.tables().atmosphere())?;
+        let (tables, sun) = (
+            sky.tables_mut(),
+            Light {
+                // Over a plane y is up at the eye, as the sky has it.
+                to_light: to_sun.as_vec3(),
+                ..view.sun
+            },
+        );
+        let albedo = options.land.material.rock_albedo();
         if ball.is_some() {
-            places = Terrain::sun_cosines()
-                .iter()
-                .map(|mu| DVec3::new((1.0 - mu * mu).max(0.0).sqrt(), *mu, 0.0))
-                .collect();
-        }
-        let level = if ball.is_some() { 0.0 } else { ground };
-        let rows: Vec<LightPlace> = places
-            .iter()
-            .map(|to_sun| LightPlace {
-                altitude: level.clamp(0.0, atmosphere.thickness),
-                to_sun: to_sun.to_array(),
-                normal: [0.0, 1.0, 0.0],
-                sun_angular_radius: f64::from(view.sun.angular_radius),
-            })
-            .collect();
-        let found = query.run(device, queue, sky.tables_mut(), &rows)?;
-        let all: Vec<TerrainLights> = found
-            .iter()
-            .zip(&places)
-            .map(|(found, to_sun)| {
-                let (sun, sky) = (Vec3::from_array(found.sun), Vec3::from_array(found.sky));
-                // What ground of an albedo of a fifth throws back onto a slope that faces it by half.
-                let bounce = 0.1 * (sun * (to_sun.y.max(0.0) as f32) + sky);
-                TerrainLights { sun, sky, bounce }
-            })
-            .collect();
-        if ball.is_some() {
+            let all =
+                TerrainLights::by_sun_from_sky(device, queue, &query, tables, &sun, 0.0, albedo)?;
             terrain.set_lights_by_sun(Some(&all))?;
         } else {
-            lights = all[0];
+            lights = TerrainLights::from_sky(device, queue, &query, tables, &sun, ground, albedo)?;
         }
     }
     let texture = |format, usage| {

@@ -549,10 +549,9 @@ fn terrain(args: &TerrainArgs) -> Result<(), CliError> {
         }
         Follow::Reference => {
             let field = land.field.prepare::<f64>()?;
-            let top = land.field.bounds()?.maximum;
             let angle = f64::from(args.pixel_angle);
             rays.iter()
-                .map(|r| field.ray_hit(land.planet_radius, top, r, angle, 0.05))
+                .map(|r| field.ray_hit(land.planet_radius, r, angle, 0.05))
                 .collect::<Result<Vec<_>, _>>()?
         }
         path => {
