@@ -139,10 +139,11 @@ impl Host {
             .flat_map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0])
             .flat_map(f32::to_le_bytes)
             .collect();
-        // The near plane lies at a metre.
+        // As the projection has it; the near plane lies at a metre.
+        let [scale, offset] = [view.projection.z_axis.z, view.projection.w_axis.z].map(f64::from);
         let depths: Vec<u8> = distances
             .iter()
-            .flat_map(|d| ((65535.0 / d).round() as u16).to_le_bytes())
+            .flat_map(|d| ((65535.0 * (offset / d - scale)).round() as u16).to_le_bytes())
             .collect();
         for (texture, bytes, texel) in [(&self.color, &texels, 16), (&self.depth, &depths, 2)] {
             gpu.queue.write_texture(
@@ -203,7 +204,18 @@ fn standing_frames_become_the_picture_of_many_samples() {
 
 #[test]
 fn a_moving_eye_finds_its_frames_again() {
-    for (taken, share) in [(SIZE, 0.65), ([43, 24], 0.65)] {
+    use veduta::glam::camera::rh::proj::directx;
+    let aspect = SIZE[0] as f32 / SIZE[1] as f32;
+    let infinite = view().projection;
+    // Greatest depths far away, and nearest.
+    let normal = directx::perspective(1.0, aspect, 1.0, 500.0);
+    let reversed = directx::perspective(1.0, aspect, 500.0, 1.0);
+    for (taken, share, projection) in [
+        (SIZE, 0.65, infinite),
+        ([43, 24], 0.65, infinite),
+        (SIZE, 0.65, normal),
+        (SIZE, 0.65, reversed),
+    ] {
         let mut host = Host::new(TemporalOptions {
             frames: 16.0,
             ..still(TemporalOptions {
@@ -219,8 +231,6 @@ fn a_moving_eye_finds_its_frames_again() {
             view.eye = view
                 .eye
                 .moved_by(DVec3::new(0.02 * t, 0.013 * t, -0.01 * t));
-            let aspect = SIZE[0] as f32 / SIZE[1] as f32;
-            let projection = view.projection;
             view.look(-0.004 * t, 0.002 * t, 1.0, aspect);
             view.projection = projection;
             let truth = truth(&view, &walls);
@@ -380,6 +390,14 @@ fn what_does_not_fit_is_named() {
         assert!(fault.to_string().contains(what), "{fault}");
     }
     temporal.set_host(device, &color, &depth).unwrap();
+    let mut flat = view();
+    flat.projection =
+        veduta::glam::camera::rh::proj::directx::orthographic(-8.0, 8.0, -4.5, 4.5, 1.0, 100.0);
+    let fault = temporal
+        .resolve(&gpu().queue, &mut encoder, &flat)
+        .unwrap_err()
+        .to_string();
+    assert!(fault.contains("projection"), "{fault}");
     let mut wrong = view();
     wrong.exposure = f32::NAN;
     assert!(
@@ -387,4 +405,42 @@ fn what_does_not_fit_is_named() {
             .resolve(&gpu().queue, &mut encoder, &wrong)
             .is_err()
     );
+}
+
+/// A host that keeps its own history of views.
+#[test]
+fn a_view_that_is_told_stands_for_the_last_one() {
+    let projection = view().projection;
+    let at = |t: f64| {
+        let mut view = view();
+        view.eye = view.eye.moved_by(DVec3::new(0.03 * t, 0.01 * t, -0.02 * t));
+        view.look(-0.005 * t, 0.0, 1.0, SIZE[0] as f32 / SIZE[1] as f32);
+        view.projection = projection;
+        view
+    };
+    // Clip space of one view from places relative to another's eye.
+    let clip = |from: &View, to: &View| {
+        from.projection
+            * from.world_from_view.inverse()
+            * veduta::glam::Mat4::from_translation(to.eye.relative_to(from.eye).as_vec3())
+    };
+    let run = |told: &dyn Fn(f64) -> Option<f64>| {
+        let mut host = Host::new(still(TemporalOptions::of(SIZE)));
+        let mut last = Vec::new();
+        for frame in 0..12 {
+            let t = f64::from(frame);
+            let mut view = at(t);
+            view.previous = told(t).map(|before| clip(&at(before), &view));
+            last = host.frame(&view, &walls);
+        }
+        last
+    };
+    let own = run(&|_| None);
+    let same = run(&|t| Some(t - 1.0));
+    let wrong = run(&|t| Some(t - 9.0));
+    let (off, away) = (apart(&own, &same), apart(&own, &wrong));
+    println!("told {off:.5}, wrongly told {away:.4}");
+    assert!(off < 2e-3 && away > 10.0 * off.max(1e-3));
+    let truth = truth(&at(11.0), &walls);
+    assert!(apart(&wrong, &truth) > 1.2 * apart(&own, &truth));
 }
