@@ -7,6 +7,7 @@ mod compose;
 mod cost;
 mod eval;
 mod frozen;
+mod land;
 mod lint;
 mod list;
 mod probe;
