@@ -428,11 +428,12 @@ fn row_l38_every_quality_key_acts_where_it_should() {
     for key in programs().keys.iter() {
         // A scene turns these on, and the target's format decides on the last.
         let elsewhere = ["TERRAIN", "ATMOSPHERE", "CLOUDS", "OUTPUT"];
-        // Sizes of the sky's tables, which no program names.
-        let size = ["COLUMNS_", "DIFFUSE_", "SKY_", "AERIAL_"]
-            .iter()
-            .any(|table| key.name.starts_with(table))
-            && (key.name.ends_with("_WIDTH") || key.name.ends_with("_HEIGHT"));
+        // Sizes of the sky's tables and of the terrain's levels, which no program names.
+        let size = key.name == "CLIP_TEXELS"
+            || ["COLUMNS_", "DIFFUSE_", "SKY_", "AERIAL_"]
+                .iter()
+                .any(|table| key.name.starts_with(table))
+                && (key.name.ends_with("_WIDTH") || key.name.ends_with("_HEIGHT"));
         let known = size || cases.iter().any(|(name, ..)| key.name == *name);
         let of_others = !acts_on(&key.name, true) && acts_on(&key.name, false);
         assert!(
