@@ -183,7 +183,7 @@ impl CloudDeck {
         let level = self.thickness / f64::from(levels.max(2) - 1);
         let tangent = 12.0 * level / self.wavelength;
         let sine = tangent / (1.0 + tangent * tangent).sqrt();
-        (sine as f32).max(super::LOWEST_SUN).min(0.99)
+        (sine as f32).clamp(super::LOWEST_SUN, 0.99)
     }
 
     /// Flags of the programs that have its noise.

@@ -1,6 +1,6 @@
 //! The ground on the device: its planes, its steps, its state back.
 
-use super::options::{Boundary, GroundOptions, Scheme, within};
+use super::options::{Boundary, GroundOptions, Scheme, Spring, within};
 use super::state::{CHANNELS, GroundState};
 use crate::device::read_staging;
 use crate::error::Error;
@@ -89,7 +89,6 @@ struct Bound {
 
 #[derive(Debug)]
 struct Tools {
-    tool: wgpu::Buffer,
     edit: Pass,
     level: Pass,
 }
@@ -106,6 +105,35 @@ struct Planes {
     arguments: wgpu::Buffer,
     step: wgpu::Buffer,
     springs: wgpu::Buffer,
+}
+
+/// How many cells a spring wells up in.
+fn cells_of(spring: &Spring, columns: usize, rows: usize) -> u32 {
+    let reach = spring.radius.ceil() as i64 + 1;
+    let mut cells = 0;
+    for z in -reach..=reach {
+        for x in -reach..=reach {
+            let at = [spring.x.round() as i64 + x, spring.z.round() as i64 + z];
+            let there = (0..columns as i64).contains(&at[0]) && (0..rows as i64).contains(&at[1]);
+            let d = [at[0] as f32 - spring.x, at[1] as f32 - spring.z];
+            cells += u32::from(there && d[0] * d[0] + d[1] * d[1] <= spring.radius * spring.radius);
+        }
+    }
+    cells
+}
+
+/// Refuses springs whose water would go nowhere.
+fn check_springs(options: &GroundOptions, columns: usize, rows: usize) -> Result<(), Error> {
+    for (k, spring) in options.springs.iter().enumerate() {
+        if spring.rate > 0.0 && cells_of(spring, columns, rows) == 0 {
+            return Err(Error::OutOfDomain {
+                name: format!("ground.springs[{k}]"),
+                value: format!("{spring:?}"),
+                domain: format!("a circle that holds the middle of a cell of {columns} x {rows}"),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// What an edit does.
@@ -208,7 +236,12 @@ impl GroundQuery {
             .poll(wgpu::PollType::Poll)
             .map_err(|e| Error::Device(e.to_string()))?;
         match receiver.try_recv() {
-            Err(_) => return Ok(None),
+            Err(std::sync::mpsc::TryRecvError::Empty) => return Ok(None),
+            Err(std::sync::mpsc::TryRecvError::Disconnected) => {
+                return Err(Error::Device(
+                    "the answer of this query has been taken, or its device is lost".to_owned(),
+                ));
+            }
             Ok(result) => result.map_err(|e| Error::Device(e.to_string()))?,
         }
         let bytes = self
@@ -294,6 +327,7 @@ impl Ground {
     ) -> Result<Ground, Error> {
         options.check()?;
         let (columns, rows) = (state.columns, state.rows);
+        check_springs(options, columns, rows)?;
         let groups = columns.div_ceil(4);
         let tiles_x = columns.div_ceil(TILE);
         let tiles = tiles_x * rows.div_ceil(TILE);
@@ -364,7 +398,7 @@ impl Ground {
             let (one, two) = (pass("ground_shallow")?, pass("ground_advance")?);
             let groups_one = [0, 1].map(|k: usize| {
                 vec![
-                    one.group(device, 0, &[(0, &p.step)]),
+                    one.group(device, 0, &[(0, &p.step), (1, &p.springs)]),
                     one.group(
                         device,
                         1,
@@ -468,7 +502,6 @@ impl Ground {
             };
         }
         let edit = Tools {
-            tool: buffer("veduta tool", 32, Usage::UNIFORM),
             edit: pass("ground_edit")?,
             level: Pass::new(device, programs, "ground_edit", &["GROUND_LEVEL"])?,
         };
@@ -621,17 +654,7 @@ impl Ground {
         let mut springs = Vec::with_capacity(64);
         for k in 0..4 {
             let row = o.springs.get(k).map_or([0.0; 4], |s| {
-                let (mut cells, reach) = (0_u32, s.radius.ceil() as i64 + 1);
-                for z in -reach..=reach {
-                    for x in -reach..=reach {
-                        let at = [s.x.round() as i64 + x, s.z.round() as i64 + z];
-                        let there = (0..self.columns as i64).contains(&at[0])
-                            && (0..self.rows as i64).contains(&at[1]);
-                        let d = [at[0] as f32 - s.x, at[1] as f32 - s.z];
-                        cells +=
-                            u32::from(there && d[0] * d[0] + d[1] * d[1] <= s.radius * s.radius);
-                    }
-                }
+                let cells = cells_of(s, self.columns, self.rows);
                 let area = cells.max(1) as f32 * o.spacing * o.spacing;
                 [s.x, s.z, s.radius, s.rate / area]
             });
@@ -691,6 +714,8 @@ impl Ground {
                 &|x, z| at(x, z, 0),
             ),
         );
+        // The faster of each cell's own faces, to +x and +z.
+        let mut faces = vec![0.0_f32; self.columns * self.rows];
         let mean = |x, z| at(x, z, 3);
         send(&p.means, &pair(&mean, &|_, _| 0.0));
         if physical {
@@ -728,6 +753,10 @@ impl Ground {
                 &p.z[0],
                 &pair(&|x, z| face(x, z, true).0, &|x, z| face(x, z, true).1),
             );
+            for (k, fastest) in faces.iter_mut().enumerate() {
+                let (x, z) = (k % self.columns, k / self.columns);
+                *fastest = face(x, z, false).0.abs().max(face(x, z, true).0.abs());
+            }
         } else {
             send(&p.x[0], &pair(&|x, z| at(x, z, 4), &|x, z| at(x, z, 6)));
             send(&p.z[0], &pair(&|x, z| at(x, z, 5), &|x, z| at(x, z, 7)));
@@ -738,13 +767,11 @@ impl Ground {
             send(change, &pair(&|x, z| at(x, z, 8), &|x, z| at(x, z, 9)));
         }
         queue.write_buffer(&p.tiles, 0, &vec![0; p.tiles.size() as usize]);
-        let fastest = checked
-            .cells
-            .chunks_exact(CHANNELS)
-            .map(|c| {
-                c[4..8].iter().fold(0.0_f32, |a, b| a.max(*b))
-                    + (self.options.gravity * c[1]).sqrt()
-            })
+        // As a step finds it: of the source's scheme nothing asks for it.
+        let fastest = faces
+            .iter()
+            .zip(checked.cells.chunks_exact(CHANNELS))
+            .map(|(face, c)| face.abs() + (self.options.gravity * c[1]).max(0.0).sqrt())
             .fold(0.0, f32::max);
         let tops: Vec<u8> = std::iter::repeat_n(fastest.to_le_bytes(), self.tiles)
             .flatten()
@@ -844,14 +871,25 @@ impl Ground {
                 .flat_map(|v: &f32| v.to_le_bytes()),
         );
         block.extend(edit.seed.to_le_bytes());
-        queue.write_buffer(&self.edit.tool, 0, &block);
+        // Of its own, so that several edits may wait in one submission.
+        let tool = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("veduta tool"),
+            size: block.len() as u64,
+            usage: wgpu::BufferUsages::UNIFORM,
+            mapped_at_creation: true,
+        });
+        tool.slice(..)
+            .get_mapped_range_mut()
+            .map_err(|e| Error::Device(e.to_string()))?
+            .copy_from_slice(&block);
+        tool.unmap();
         let (p, t) = (&self.planes, &self.edit);
         let sets = [
             (
                 &t.edit,
                 [
-                    t.edit.group(device, 0, &[(0, &p.step), (1, &t.tool)]),
-                    t.edit.group(device, 1, &[(0, &p.ground)]),
+                    t.edit.group(device, 0, &[(0, &p.step), (1, &tool)]),
+                    t.edit.group(device, 1, &[(0, &p.ground), (1, &p.tiles)]),
                     t.edit
                         .group(device, 2, &[(0, &p.load[1]), (1, self.water_now())]),
                 ],
@@ -884,15 +922,17 @@ impl Ground {
                 size,
             );
         }
-        if edit.tool == Tool::Raise {
-            self.range[0] += edit.strength.min(0.0);
-            self.range[1] += edit.strength.max(0.0);
-        }
-        self.wake(queue);
+        let [low, high] = self.range;
+        self.range = match edit.tool {
+            Tool::Raise => [low + edit.strength.min(0.0), high + edit.strength.max(0.0)],
+            Tool::Noise { .. } => [low - edit.strength.abs(), high + edit.strength.abs()],
+            Tool::Flatten { height } => [low.min(height), high.max(height)],
+            Tool::Smooth | Tool::Water => [low, high],
+        };
         Ok(Work {
             dispatches: 2,
-            writes: 2,
-            bytes: 32 + 4 * self.tiles as u64,
+            writes: 1,
+            bytes: 32,
             ..Default::default()
         })
     }

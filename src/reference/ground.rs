@@ -321,10 +321,18 @@ impl Shallow {
                 let own = Some(k);
                 let q_back = 0.5 * (q(back, axis) + q(own, axis));
                 let q_far = 0.5 * (q(own, axis) + q(Some(far), axis));
-                let q_low = 0.5 * (q(low, 1 - axis) + q(far_low, 1 - axis));
-                let q_high = 0.5 * (q(own, 1 - axis) + q(Some(far), 1 - axis));
                 let (before, behind) = (speed(back, 0.0), speed(Some(far), 0.0));
-                let depth = (0.5 * (old.water[k] + old.water[far])).max(1e-5);
+                let (near_h, far_h) = (old.water[k], old.water[far]);
+                let rise = old.ground[far] - old.ground[k];
+                let (over_near, over_far) = (sill_depth(near_h, rise), sill_depth(far_h, -rise));
+                // Of what runs across, that over the higher ground.
+                let (near_share, far_share) =
+                    (over_near / near_h.max(1e-9), over_far / far_h.max(1e-9));
+                let across = |near, far| {
+                    0.5 * (q(near, 1 - axis) * near_share + q(far, 1 - axis) * far_share)
+                };
+                let (q_low, q_high) = (across(low, far_low), across(own, Some(far)));
+                let depth = (0.5 * (over_near + over_far)).max(1e-7);
                 // Head where the flow gains speed along itself, else momentum.
                 let mut with_before = q_back.max(0.0);
                 if u > before {
@@ -340,19 +348,16 @@ impl Shallow {
                     (q_low.max(0.0), speed(low, u)),
                     ((-q_high).max(0.0), speed(high, u)),
                 ];
-                let (near_h, far_h) = (old.water[k], old.water[far]);
                 let share = scale / depth;
                 let all = arriving.iter().map(|(q, _)| q).sum::<f64>() * share;
                 let gain: f64 = arriving.iter().map(|(q, v)| q * (v - u)).sum();
                 let mut next = u + gain * share / all.max(1.0);
-                let rise = old.ground[far] - old.ground[k];
                 let drop = level_drop(
                     old.ground[k] + near_h,
                     old.ground[far] + far_h,
                     near_h.max(far_h),
                 );
                 next += gravity * scale * drop;
-                let (over_near, over_far) = (sill_depth(near_h, rise), sill_depth(far_h, -rise));
                 next = rubbed_speed(next, over_near.max(over_far), friction, gravity, step);
                 let most = 0.249 / scale;
                 next = next.clamp(-most, most);

@@ -516,11 +516,16 @@ fn ground_goes_on_bit_for_bit() {
         scene.columns = 70;
         scene.rows = 50;
         scene.options.scheme = scheme;
-        scene.options.step = 0.1;
+        // The physical scheme finds its step from the data.
+        scene.options.step = 0.1 * f32::from(u8::from(scheme == Scheme::Source));
         if scheme == Scheme::Source {
             scene.options.erosion = Some(Erosion::default());
         }
-        let begin = scene.begin(gpu(), veduta::programs()).unwrap();
+        let mut begin = scene.begin(gpu(), veduta::programs()).unwrap();
+        // Waves from the start, fastest where water stands over a rise.
+        for (k, cell) in begin.cells.chunks_exact_mut(CHANNELS).enumerate() {
+            cell[1] = 0.3 + 0.2 * (0.37 * k as f32).sin();
+        }
         let (whole, _) = run(&scene.options, &begin, 151);
         let (half, _) = run(&scene.options, &begin, 70);
         let (rest, _) = run(&scene.options, &half, 81);
@@ -529,6 +534,130 @@ fn ground_goes_on_bit_for_bit() {
         assert_eq!(whole, again, "{scheme:?}");
         assert!(whole.sums()[1] > 0.0);
     }
+}
+
+/// Water that falls gains what the fall gives and no more: films over steep ground do not race.
+#[test]
+fn ground_shallow_water_has_the_speed_of_its_fall() {
+    let (columns, rows) = (96, 96);
+    let heights: Vec<f32> = (0..columns * rows)
+        .map(|k| {
+            let (x, z) = ((k % columns) as f32, (k / columns) as f32);
+            20.0 * (0.11 * x).sin() * (0.13 * z).cos() + 6.0 * (0.7 * x + 0.5 * z).sin()
+        })
+        .collect();
+    let mut state = GroundState::from_heights(columns, rows, &heights).unwrap();
+    let mut head = [f32::INFINITY, f32::NEG_INFINITY];
+    for (cell, height) in state.cells.chunks_exact_mut(CHANNELS).zip(&heights) {
+        cell[1] = (4.0 - height).max(0.0);
+        head = [head[0].min(*height), head[1].max(height + cell[1])];
+    }
+    let options = GroundOptions {
+        scheme: Scheme::Physical,
+        step: 0.0,
+        rain: 1e-4,
+        springs: vec![veduta::ground::Spring {
+            x: 40.0,
+            z: 40.0,
+            radius: 4.0,
+            rate: 20.0,
+        }],
+        ..Default::default()
+    };
+    let most = (2.0 * options.gravity * (head[1] - head[0])).sqrt();
+    let mut fastest = 0.0_f32;
+    for _ in 0..4 {
+        let (after, report) = run(&options, &state, 500);
+        let now = after
+            .cells
+            .chunks_exact(CHANNELS)
+            .flat_map(|c| c[4..8].iter().copied())
+            .fold(0.0, f32::max);
+        println!("{now:.1} m/s of {most:.1}, step {:.4} s", report.last_step);
+        fastest = fastest.max(now);
+        state = after;
+    }
+    assert!(fastest > 1.0 && fastest < most);
+}
+
+/// Edits that follow steps in one submission are not slept through, and each has its own tool.
+#[test]
+fn ground_edits_in_one_submission_all_act() {
+    for scheme in [Scheme::Source, Scheme::Physical] {
+        let options = GroundOptions {
+            scheme,
+            step: 0.5 * f32::from(u8::from(scheme == Scheme::Source)),
+            boundary: Boundary::Closed,
+            ..Default::default()
+        };
+        let state = GroundState::from_heights(96, 64, &vec![0.0; 96 * 64]).unwrap();
+        let gpu = gpu();
+        let mut ground = Ground::new(
+            &gpu.device,
+            &gpu.queue,
+            veduta::programs(),
+            &options,
+            &state,
+        )
+        .unwrap();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let pour = |x: f32, strength: f32| GroundEdit {
+            tool: Tool::Water,
+            x,
+            z: 30.0,
+            radius: Some(6.0),
+            strength,
+            seed: 0,
+        };
+        let _ = ground.step(&mut encoder, 40);
+        for edit in [pour(20.0, 3.0), pour(70.0, 1.0)] {
+            let _ = ground
+                .edit(&gpu.device, &gpu.queue, &mut encoder, &edit)
+                .unwrap();
+        }
+        let _ = ground.step(&mut encoder, 1);
+        gpu.queue.submit([encoder.finish()]);
+        let report = ground.report(gpu).unwrap();
+        println!("{scheme:?}: first step {:.4} s", report.last_step);
+        if scheme == Scheme::Physical {
+            // The waves of what was poured bound it.
+            assert!(report.last_step <= f64::from(0.2 / (9.81_f32 * 2.9).sqrt()));
+        }
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let _ = ground.step(&mut encoder, 30);
+        gpu.queue.submit([encoder.finish()]);
+        let after = ground.state(gpu).unwrap();
+        // Both hills of water are there, the higher with three times as much, and both have run beyond their edge.
+        let sums = [0, 48].map(|first| -> f64 {
+            (0..64)
+                .flat_map(|z| (first..first + 48).map(move |x| (x, z)))
+                .map(|(x, z)| f64::from(after.water(x, z)))
+                .sum()
+        });
+        println!("{sums:?}");
+        assert!(sums[1] > 20.0 && sums[0] > 2.0 * sums[1]);
+        assert!(
+            [20, 70]
+                .map(|x| after.water(x, 37))
+                .iter()
+                .all(|w| *w > 1e-4)
+        );
+    }
+    let state = GroundState::from_heights(32, 32, &vec![0.0; 1024]).unwrap();
+    let astray = GroundOptions {
+        springs: vec![veduta::ground::Spring {
+            x: 100.0,
+            z: 5.0,
+            radius: 3.0,
+            rate: 1.0,
+        }],
+        ..Default::default()
+    };
+    let gpu = gpu();
+    let refused = Ground::new(&gpu.device, &gpu.queue, veduta::programs(), &astray, &state);
+    assert!(
+        matches!(&refused, Err(veduta::Error::OutOfDomain { name, .. }) if name == "ground.springs[0]")
+    );
 }
 
 #[test]

@@ -145,7 +145,8 @@ fn ground_rain_makes_streams_and_lakes() {
         };
         assert!(wet.water(66, 32) > 3.0, "{}", wet.water(66, 32));
         assert!(lake(&wet).len() > 60, "{} cells", lake(&wet).len());
-        assert!(spread(&lake(&wet)) < 0.3, "{}", spread(&lake(&wet)));
+        // Streams pour into it on all sides.
+        assert!(spread(&lake(&wet)) < 0.4, "{}", spread(&lake(&wet)));
         // No more rain.
         options.rain = 0.0;
         ground.set_options(&gpu().queue, &options).unwrap();

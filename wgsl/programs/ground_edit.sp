@@ -39,6 +39,7 @@ struct Edit {
 
 @group(0) @binding(1) var<uniform> tool: Edit;
 @group(1) @binding(0) var<storage, read> ground: array<vec4<f32>>;
+@group(1) @binding(1) var<storage, read_write> tiles: array<atomic<u32>>;
 @group(2) @binding(0) var<storage, read_write> change: array<vec4<f32>>;
 @group(2) @binding(1) var<storage, read_write> water: array<vec4<f32>>;
 
@@ -91,10 +92,18 @@ fn edit(@builtin(global_invocation_id) id: vec3<u32>) {
         more = (vec4<f32>(tool.height) - here) * clamp(tool.strength, 0.0, 1.0);
     }
     more *= share;
+    let tile = (z >> 5u) * now.tiles_x + (group >> 3u);
+    if any(share > vec4<f32>(0.0)) {
+        atomicStore(&tiles[16 + tile], 1u);
+    }
     if tool.tool == 3 {
         let had = water[at];
         let pair = add_exactly(had, water[plane + at], max(more, -had), now.none);
-        water[at] = max(pair.value, vec4<f32>(0.0));
+        let after = max(pair.value, vec4<f32>(0.0));
+        water[at] = after;
+        // The next step's length follows the waves of what was poured.
+        let deepest = max(max(after.x, after.y), max(after.z, after.w));
+        atomicMax(&tiles[16 + now.tiles + tile], bitcast<u32>(sqrt(now.gravity * deepest)));
         water[plane + at] = select(pair.lost, vec4<f32>(0.0), pair.value <= vec4<f32>(0.0));
     } else {
         let pair = add_exactly(change[at], change[plane + at], more, now.none);

@@ -4,12 +4,13 @@ First half of a step of shallow water: speeds on the faces towards +x and +z, by
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, strip_of, row_start, plane_of, row_at, columns_of, from_left, from_right}
+#import veduta::ground::grid::{GroundStep, strip_of, row_start, plane_of, row_at, columns_of, from_left, from_right, sourced}
 #import veduta::ground::exact::{opaque}
 #import veduta::ground::flow::{level_drop}
 #import veduta::ground::shallow::{sill_depth, rubbed_speed}
 
 @group(0) @binding(0) var<uniform> now: GroundStep;
+@group(0) @binding(1) var<uniform> sources: mat4x4<f32>;
 @group(1) @binding(0) var<storage, read> water: array<vec4<f32>>;
 @group(1) @binding(1) var<storage, read> ground: array<vec4<f32>>;
 @group(1) @binding(2) var<storage, read_write> tiles: array<atomic<u32>>;
@@ -26,11 +27,15 @@ struct Flow {
     behind: vec4<f32>,
     below: vec4<f32>,
     above: vec4<f32>,
-    // Discharges through the middles of the cells on both sides, and through the ends of the face.
+    // Discharges through the middles of the cells on both sides, and across, of the near and of the far cell.
     in_before: vec4<f32>,
     in_behind: vec4<f32>,
-    in_below: vec4<f32>,
-    in_above: vec4<f32>,
+    near_below: vec4<f32>,
+    far_below: vec4<f32>,
+    near_above: vec4<f32>,
+    far_above: vec4<f32>,
+    // What rains and springs up in a second, at rest.
+    fresh: vec4<f32>,
 }
 
 fn next_speed(flow: Flow, ground_near: vec4<f32>, near: vec4<f32>, ground_far: vec4<f32>, far: vec4<f32>, step: f32) -> vec4<f32> {
@@ -38,7 +43,8 @@ fn next_speed(flow: Flow, ground_near: vec4<f32>, near: vec4<f32>, ground_far: v
     let rise = ground_far - ground_near;
     let over_near = sill_depth(near, rise);
     let over_far = sill_depth(far, -rise);
-    let depth = max(0.5 * (near + far), vec4<f32>(1e-5));
+    // What is moved stands over the higher ground: a film that falls into deep water has no share in that water's inertia.
+    let depth = max(0.5 * (over_near + over_far), vec4<f32>(1e-7));
     // Where the flow gains speed along itself it keeps its head, else its momentum.
     let head_before = max(0.5 * (flow.before + flow.speed), none) * depth;
     let head_behind = max(-0.5 * (flow.behind + flow.speed), none) * depth;
@@ -46,8 +52,13 @@ fn next_speed(flow: Flow, ground_near: vec4<f32>, near: vec4<f32>, ground_far: v
     let with_behind = max(-flow.in_behind, none);
     let from_before = select(with_before, min(with_before, head_before), flow.speed > flow.before);
     let from_behind = select(with_behind, min(with_behind, head_behind), flow.speed < flow.behind);
-    let from_below = max(flow.in_below, none);
-    let from_above = max(-flow.in_above, none);
+    // Of what runs across, that which stands over the higher ground alone is of this speed.
+    let near_share = over_near / max(near, vec4<f32>(1e-9));
+    let far_share = over_far / max(far, vec4<f32>(1e-9));
+    let below = 0.5 * (opaque(flow.near_below * near_share, now.none) + opaque(flow.far_below * far_share, now.none));
+    let above = 0.5 * (opaque(flow.near_above * near_share, now.none) + opaque(flow.far_above * far_share, now.none));
+    let from_below = max(below, none);
+    let from_above = max(-above, none);
     let scale = step / now.spacing;
     let share = scale / depth;
     let all = ((from_before + from_behind) + (from_below + from_above)) * share;
@@ -55,7 +66,7 @@ fn next_speed(flow: Flow, ground_near: vec4<f32>, near: vec4<f32>, ground_far: v
     let along = opaque(from_before * (flow.before - flow.speed), now.none) + opaque(from_behind * (flow.behind - flow.speed), now.none);
     let across = opaque(from_below * (flow.below - flow.speed), now.none) + opaque(from_above * (flow.above - flow.speed), now.none);
     let gain = along + across;
-    let carried = flow.speed + gain * (share / max(all, vec4<f32>(1.0)));
+    let carried = (flow.speed + gain * (share / max(all, vec4<f32>(1.0)))) * (depth / (depth + flow.fresh * step));
     let drop = level_drop(ground_near + near, ground_far + far, max(near, far));
     // Small depths over high ground: the levels' difference is that of depths less the rise, which rounds less.
     let fine = select((near - far) - rise, none, drop == none);
@@ -104,7 +115,10 @@ fn shallow(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
     let first_left = 4 * row_start(now, place.first) + place.left;
     var qx_left = has_left * from_left(qx, old_x[plane + (first_left >> 2u)][first_left & 3]);
     var stirs = vec4<f32>(0.0);
+    var spring = sourced(sources, now.sources, columns, place.first);
     for (var z = place.first; z < place.end; z++) {
+        let right_spring = sourced(sources, now.sources, columns + vec4<i32>(1), z);
+        let high_spring = sourced(sources, now.sources, columns, z + 1);
         let at = row_start(now, z) + place.column;
         let high_row = row_at(now, z + 1);
         let next = row_start(now, high_row) + place.column;
@@ -136,9 +150,9 @@ fn shallow(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
         let right_w = from_right(w, old_z[right_group][right_lane], last);
         // Where there is no row or column, the face beside has the same speed: nothing rubs on walls.
         let along_x = Flow(u, left_u, right_u, select(low_u, u, has_low == 0.0), select(high_u, u, has_high == 0.0),
-            0.5 * (qx_left + qx), 0.5 * (qx + right_qx), 0.5 * (low_qz + right_low_qz), 0.5 * (qz + right_qz));
+            0.5 * (qx_left + qx), 0.5 * (qx + right_qx), low_qz, right_low_qz, qz, right_qz, now.rain + 0.5 * (spring + right_spring));
         let along_z = Flow(w, low_w, high_w * has_high, select(left_w, w, has_left == vec4<f32>(0.0)), select(right_w, w, has_right == vec4<f32>(0.0)),
-            0.5 * (low_qz + qz), 0.5 * (qz + high_qz * has_high), 0.5 * (qx_left + high_qx_left), 0.5 * (qx + high_qx));
+            0.5 * (low_qz + qz), 0.5 * (qz + high_qz * has_high), qx_left, high_qx_left, qx, high_qx, now.rain + 0.5 * (spring + high_spring));
         faces_x[at] = inside * has_right * next_speed(along_x, here_ground, here_water, right_ground, right_water, step);
         faces_z[at] = inside * has_high * next_speed(along_z, here_ground, here_water, high_ground, high_water, step);
         // A tile may sleep only when both buffers hold stillness.
@@ -152,6 +166,7 @@ fn shallow(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
         qx = high_qx;
         qz = high_qz;
         qx_left = high_qx_left;
+        spring = high_spring;
         here_water = high_water;
         here_ground = high_ground;
     }
