@@ -840,14 +840,13 @@ impl Ground {
         [self.columns, self.rows]
     }
 
-    /// Records a change of the ground or its water, and wakes all tiles. One edit a submission.
+    /// Records a change of the ground or its water, and wakes all tiles. Several may wait in one submission, between steps.
     ///
     /// # Errors
     /// As [`GroundEdit::check`].
     pub fn edit(
         &mut self,
         device: &wgpu::Device,
-        queue: &wgpu::Queue,
         encoder: &mut wgpu::CommandEncoder,
         edit: &GroundEdit,
     ) -> Result<Work, Error> {

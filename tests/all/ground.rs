@@ -611,9 +611,7 @@ fn ground_edits_in_one_submission_all_act() {
         };
         let _ = ground.step(&mut encoder, 40);
         for edit in [pour(20.0, 3.0), pour(70.0, 1.0)] {
-            let _ = ground
-                .edit(&gpu.device, &gpu.queue, &mut encoder, &edit)
-                .unwrap();
+            let _ = ground.edit(&gpu.device, &mut encoder, &edit).unwrap();
         }
         let _ = ground.step(&mut encoder, 1);
         gpu.queue.submit([encoder.finish()]);
@@ -631,7 +629,7 @@ fn ground_edits_in_one_submission_all_act() {
         let sums = [0, 48].map(|first| -> f64 {
             (0..64)
                 .flat_map(|z| (first..first + 48).map(move |x| (x, z)))
-                .map(|(x, z)| f64::from(after.water(x, z)))
+                .map(|(x, z)| after.water(x, z))
                 .sum()
         });
         println!("{sums:?}");
@@ -799,9 +797,7 @@ fn ground_erodes_lays_down_and_slides() {
 
 pub fn edited(ground: &mut Ground, edit: &GroundEdit) {
     let mut encoder = gpu().device.create_command_encoder(&Default::default());
-    let _ = ground
-        .edit(&gpu().device, &gpu().queue, &mut encoder, edit)
-        .unwrap();
+    let _ = ground.edit(&gpu().device, &mut encoder, edit).unwrap();
     gpu().queue.submit([encoder.finish()]);
 }
 
