@@ -769,7 +769,7 @@ fn rays_of_probes_are_checked() {
             "the length of the direction to the sun of row 3",
             "NaN",
         ),
-        (7, 0.0, "the distance of row 3", "0.0"),
+        (7, -1.0, "the distance of row 3", "-1.0"),
         (7, f64::NAN, "the distance of row 3", "NaN"),
     ];
     for (column, number, name, value) in bad {
