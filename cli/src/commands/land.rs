@@ -35,8 +35,8 @@ pub struct LandArgs {
         long,
         value_name = "X,Z",
         value_delimiter = ',',
-        num_args = 2,
-        allow_negative_numbers = true
+        num_args = 1..=2,
+        allow_hyphen_values = true
     )]
     pub place: Option<Vec<f64>>,
     /// Height of the eye above the ground in metres, 0.1 to 1e7; over a ball up to 1e8
@@ -119,7 +119,16 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
     let far = args.far.unwrap_or(if ball.is_some() { 1e9 } else { 1e5 });
     within("--far", far, 100.0, if ball.is_some() { 1e9 } else { 4e6 })?;
     let place = match (&args.place, &ball) {
-        (Some(place), _) => [place[0], place[1]],
+        (Some(place), _) => match place[..] {
+            [x, z] => [x, z],
+            _ => {
+                return Err(CliError::argument(
+                    "--place",
+                    format!("{place:?}"),
+                    "two numbers, as 1000,-2000".to_owned(),
+                ));
+            }
+        },
         (None, Some(_)) => [20.0, 0.0],
         (None, None) => [13_500.0, -14_700.0],
     };

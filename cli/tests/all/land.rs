@@ -165,6 +165,13 @@ fn a_land_is_drawn_under_its_sky() {
     assert!(mean(7..9, 2) < 1.3 * mean(7..9, 0));
     assert!(light.iter().all(|v| v.is_finite() && *v >= 0.0));
     veduta(&dir, &["land", "--land", "venus", "--out", "c.png"]).bad(1, &["venus", "alps"]);
+    // A place is two numbers, with a comma or a space between them.
+    run(&["--out", "d.png", "--place", "-500,250"]);
+    run(&["--out", "e.png", "--place", "-500", "250"]);
+    assert_eq!(png(&dir.join("d.png")), png(&dir.join("e.png")));
+    assert_ne!(png(&dir.join("d.png")), png(&dir.join("a.png")));
+    let one = ["land", "--land", "hills", "--out", "f.png", "--place", "7"];
+    veduta(&dir, &one).bad(1, &["--place", "two numbers"]);
 }
 
 #[test]
