@@ -83,7 +83,8 @@ pub fn draw(size: [u32; 2], shot: &Shot) -> Fallible<Vec<u8>> {
     let mut host = (view.projection * view.world_from_view.inverse())
         .to_cols_array()
         .to_vec();
-    let irradiance = |of: [f32; 3]| Vec3::from_array(of) * view.sun.irradiance;
+    let colour = Vec3::from_array(options.atmosphere.sun.colour.map(|c| c as f32));
+    let irradiance = |of: [f32; 3]| Vec3::from_array(of) * view.sun.irradiance * colour;
     host.extend(view.sun.to_light.extend(shot.altitude as f32).to_array());
     host.extend(irradiance(light.sun).extend(0.0).to_array());
     host.extend(irradiance(light.sky).extend(0.0).to_array());

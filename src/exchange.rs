@@ -100,3 +100,33 @@ pub(crate) fn compute(
         }),
     }
 }
+
+/// What a binding gets.
+type Bound<'a> = &'a [(u32, wgpu::BindingResource<'a>)];
+
+/// Bind groups for a program's layouts, from what each group's bindings get.
+pub(crate) fn bind_groups(
+    device: &wgpu::Device,
+    label: &str,
+    layouts: &[wgpu::BindGroupLayout],
+    bound: &[Bound<'_>],
+) -> Vec<wgpu::BindGroup> {
+    layouts
+        .iter()
+        .zip(bound)
+        .map(|(layout, resources)| {
+            let entries: Vec<wgpu::BindGroupEntry<'_>> = resources
+                .iter()
+                .map(|(binding, resource)| wgpu::BindGroupEntry {
+                    binding: *binding,
+                    resource: resource.clone(),
+                })
+                .collect();
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some(label),
+                layout,
+                entries: &entries,
+            })
+        })
+        .collect()
+}

@@ -1,14 +1,16 @@
 //! Pictures of what a system draws, under the sky of an atmosphere.
 
-use veduta::atmosphere::{Atmosphere, LightPlace, Sky, SkyComposition, SkyOptions, SkyQuery};
+use veduta::atmosphere::{Atmosphere, Sky, SkyComposition, SkyOptions, SkyQuery};
 use veduta::device::Gpu;
-use veduta::glam::{DVec3, Vec3};
+use veduta::glam::Vec3;
 use veduta::terrain::TerrainLights;
 use veduta::wgpu;
 use veduta::{Preset, Targets, View};
 
 use crate::error::CliError;
-use crate::render::Size;
+use crate::render::{Size, picture};
+
+const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// A picture of one size, its depth, and the sky over it.
 pub struct UnderSky {
@@ -26,7 +28,7 @@ impl UnderSky {
     pub fn targets() -> Targets {
         Targets {
             color_format: wgpu::TextureFormat::Rgba32Float,
-            depth_format: Some(wgpu::TextureFormat::Depth32Float),
+            depth_format: Some(DEPTH),
             ..Default::default()
         }
     }
@@ -37,33 +39,14 @@ impl UnderSky {
     /// What the library reports.
     pub fn new(air: Atmosphere, size: Size) -> Result<UnderSky, CliError> {
         let gpu = veduta::device::shared()?;
-        let texture = |format, usage| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("picture"),
-                size: wgpu::Extent3d {
-                    width: size.width,
-                    height: size.height,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT,
-                view_formats: &[],
-            })
-        };
-        let (color, read) = (
-            wgpu::TextureFormat::Rgba32Float,
-            wgpu::TextureUsages::TEXTURE_BINDING,
-        );
-        let scene = texture(color, read);
-        let depth = texture(wgpu::TextureFormat::Depth32Float, read);
-        let shown = texture(color, wgpu::TextureUsages::COPY_SRC);
+        let targets = UnderSky::targets();
+        let texture = |format| picture(&gpu.device, size, format);
+        let (scene, shown) = (texture(targets.color_format), texture(targets.color_format));
+        let depth = texture(DEPTH);
         let views = [&scene, &depth, &shown].map(|t| t.create_view(&Default::default()));
         let over = Targets {
             depth_format: None,
-            ..UnderSky::targets()
+            ..targets
         };
         let query = SkyQuery::new(&gpu.device, veduta::programs(), &air)?;
         let options = SkyOptions {
@@ -84,31 +67,20 @@ impl UnderSky {
         })
     }
 
-    /// Lights on level ground at an altitude (m).
+    /// Lights on level ground of an albedo of a fifth at an altitude (m).
     ///
     /// # Errors
     /// What the library reports.
     pub fn lights(&mut self, view: &View, altitude: f64) -> Result<TerrainLights, CliError> {
-        let to_sun: DVec3 = view.sun.to_light.as_dvec3().normalize_or(DVec3::Y);
-        let thickness = self.sky.tables().atmosphere().thickness;
-        let place = LightPlace {
-            altitude: altitude.clamp(0.0, thickness),
-            to_sun: to_sun.to_array(),
-            normal: [0.0, 1.0, 0.0],
-            sun_angular_radius: f64::from(view.sun.angular_radius),
-        };
-        let found = self.query.run(
+        Ok(TerrainLights::from_sky(
             &self.gpu.device,
             &self.gpu.queue,
+            &self.query,
             self.sky.tables_mut(),
-            &[place],
-        )?;
-        let (sun, sky) = found.first().map_or((Vec3::ZERO, Vec3::ZERO), |f| {
-            (Vec3::from_array(f.sun), Vec3::from_array(f.sky))
-        });
-        // What ground of an albedo of a fifth throws back onto a slope that faces it by half.
-        let bounce = 0.1 * (sun * (to_sun.y.max(0.0) as f32) + sky);
-        Ok(TerrainLights { sun, sky, bounce })
+            &view.sun,
+            altitude,
+            Vec3::splat(0.2),
+        )?)
     }
 
     /// Linear RGB by rows from the top, of what `record` prepares and `draw` draws, with the air before it.

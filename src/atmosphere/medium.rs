@@ -550,6 +550,20 @@ impl Atmosphere {
         }
     }
 
+    /// Whether this air runs with programs that were composed for air with `features`.
+    pub(crate) fn check_features(&self, name: &str, features: &[&str]) -> Result<(), Error> {
+        if self.features() == features {
+            return Ok(());
+        }
+        Err(Error::OutOfDomain {
+            name: name.to_owned(),
+            value: format!("air with the features {:?}", self.features()),
+            domain: format!(
+                "air with the features {features:?}, as before; other air needs an object of its own"
+            ),
+        })
+    }
+
     /// What the table of columns depends on: radius, thickness and profiles, as bytes to compare.
     pub(crate) fn profile_bytes(&self) -> Vec<u8> {
         let profiles = self

@@ -136,14 +136,9 @@ impl SkyQuery {
                 domain: domain.to_owned(),
             })
         };
-        if tables.atmosphere().features() != self.features {
-            let lobes = tables.atmosphere().lanes().len();
-            return fault(
-                "tables",
-                lobes,
-                "air with the same `Atmosphere::features` as the query's",
-            );
-        }
+        tables
+            .atmosphere()
+            .check_features("tables", self.features)?;
         if !tables.quality().all_orders {
             return fault("tables.all_orders", 0, "on");
         }

@@ -137,7 +137,7 @@ struct PassMaker {
     depth_stencil: Option<wgpu::DepthStencilState>,
     sample_count: u32,
     output: f64,
-    march: [u32; 2],
+    march: Option<[u32; 2]>,
 }
 
 impl PassMaker {
@@ -161,14 +161,15 @@ impl PassMaker {
         draw: &wgpu::Buffer,
         place: EyePlace,
     ) -> Result<Layer, Error> {
+        let [steps, light_steps] = self.march.unwrap_or_default().map(f64::from);
         let constants: Vec<(&str, f64)> = program
             .overrides
             .iter()
             .map(|o| {
                 let value = match o.name.as_ref() {
                     "OUTPUT" => self.output,
-                    "MARCH_STEPS" => f64::from(self.march[0]),
-                    "MARCH_LIGHT_STEPS" => f64::from(self.march[1]),
+                    "MARCH_STEPS" => steps,
+                    "MARCH_LIGHT_STEPS" => light_steps,
                     _ => f64::from(place as u8),
                 };
                 (o.name.as_ref(), value)
@@ -262,8 +263,7 @@ impl Sky {
                     .to_owned(),
             });
         }
-        let march = options.march.unwrap_or([0, 0]);
-        if options.march.is_some() {
+        if let Some(march) = options.march {
             let [steps, light_steps] = march.map(u64::from);
             let fits = (1..=512).contains(&steps)
                 && (0..=64).contains(&light_steps)
@@ -328,7 +328,7 @@ impl Sky {
             depth_stencil,
             sample_count: targets.sample_count,
             output,
-            march,
+            march: options.march,
         };
         let mut sky = Sky {
             tables,
@@ -518,7 +518,7 @@ impl Sky {
         } else {
             EyePlace::Low
         };
-        if self.maker.march != [0, 0] && self.place != EyePlace::Low {
+        if self.maker.march.is_some() && self.place != EyePlace::Low {
             return Err(fault(
                 "view.eye",
                 format!("{altitude} m"),

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::exchange;
+pub(super) use crate::exchange::bind_groups;
 use crate::landscape::{Resources, Work};
 use crate::program::ProgramSet;
 use crate::programs::blocks::{SkyEye as EyeBlock, SkyLook as LookBlock};
@@ -257,36 +258,6 @@ pub(super) fn upload(
         work.bytes += bytes.len() as u64;
         *held = bytes;
     }
-}
-
-/// What a binding gets.
-type Bound<'a> = &'a [(u32, wgpu::BindingResource<'a>)];
-
-/// Bind groups for a program's layouts, from what each group's bindings get.
-pub(super) fn bind_groups(
-    device: &wgpu::Device,
-    label: &str,
-    layouts: &[wgpu::BindGroupLayout],
-    bound: &[Bound<'_>],
-) -> Vec<wgpu::BindGroup> {
-    layouts
-        .iter()
-        .zip(bound)
-        .map(|(layout, resources)| {
-            let entries: Vec<wgpu::BindGroupEntry<'_>> = resources
-                .iter()
-                .map(|(binding, resource)| wgpu::BindGroupEntry {
-                    binding: *binding,
-                    resource: resource.clone(),
-                })
-                .collect();
-            device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some(label),
-                layout,
-                entries: &entries,
-            })
-        })
-        .collect()
 }
 
 /// The pipeline of a compute program for an atmosphere, with its layouts.
@@ -639,15 +610,7 @@ impl SkyTables {
     /// As [`Atmosphere::check`]; [`Error::OutOfDomain`] for an air that needs other programs, which [`Atmosphere::features`] tells.
     pub fn set_atmosphere(&mut self, atmosphere: &Atmosphere) -> Result<(), Error> {
         atmosphere.check()?;
-        if atmosphere.features() != self.atmosphere.features() {
-            return Err(Error::OutOfDomain {
-                name: "atmosphere.layers".to_owned(),
-                value: format!("{} lobes", atmosphere.lanes().len()),
-                domain:
-                    "air with the same `Atmosphere::features` as before; other air needs tables of its own"
-                        .to_owned(),
-            });
-        }
+        atmosphere.check_features("atmosphere.layers", self.atmosphere.features())?;
         self.atmosphere = atmosphere.clone();
         Ok(())
     }

@@ -87,13 +87,7 @@ impl TransmittanceTable {
         atmosphere: &Atmosphere,
     ) -> Result<Work, Error> {
         let bytes = atmosphere.air_bytes()?;
-        if atmosphere.features() != self.features {
-            return Err(Error::OutOfDomain {
-                name: "atmosphere.layers".to_owned(),
-                value: format!("{} lobes", atmosphere.lanes().len()),
-                domain: "air that needs the same programs as before".to_owned(),
-            });
-        }
+        atmosphere.check_features("atmosphere.layers", self.features)?;
         let mut work = Work::default();
         upload(queue, &self.air, &mut self.air_bytes, bytes, &mut work);
         if work.writes > 0 || !self.made {

@@ -5,7 +5,7 @@ use super::phase::Lobes;
 use super::{Orders, ProbePath, fault};
 use crate::device::Gpu;
 use crate::error::Error;
-use crate::exchange::{Exchange, compute};
+use crate::exchange::{Exchange, bind_groups, compute};
 use crate::program::ProgramSet;
 use crate::programs::blocks::CloudGrid as GridBlock;
 
@@ -529,21 +529,8 @@ pub(super) fn groups(
     kernel: &Kernel,
     bound: &[Vec<(u32, wgpu::BindingResource<'_>)>; 3],
 ) -> Vec<wgpu::BindGroup> {
-    let made = |(layout, list): (_, &Vec<(u32, wgpu::BindingResource<'_>)>)| {
-        let entries: Vec<wgpu::BindGroupEntry<'_>> = list
-            .iter()
-            .map(|(binding, resource)| wgpu::BindGroupEntry {
-                binding: *binding,
-                resource: resource.clone(),
-            })
-            .collect();
-        device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("veduta cloud light"),
-            layout,
-            entries: &entries,
-        })
-    };
-    kernel.1.iter().zip(bound).map(made).collect()
+    let bound = bound.each_ref().map(Vec::as_slice);
+    bind_groups(device, "veduta cloud light", &kernel.1, &bound)
 }
 
 pub(super) fn dispatch(

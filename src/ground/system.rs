@@ -107,19 +107,19 @@ struct Planes {
     springs: wgpu::Buffer,
 }
 
-/// How many cells a spring wells up in.
+/// How many cells of the grid a spring wells up in.
 fn cells_of(spring: &Spring, columns: usize, rows: usize) -> u32 {
-    let reach = spring.radius.ceil() as i64 + 1;
-    let mut cells = 0;
-    for z in -reach..=reach {
-        for x in -reach..=reach {
-            let at = [spring.x.round() as i64 + x, spring.z.round() as i64 + z];
-            let there = (0..columns as i64).contains(&at[0]) && (0..rows as i64).contains(&at[1]);
-            let d = [at[0] as f32 - spring.x, at[1] as f32 - spring.z];
-            cells += u32::from(there && d[0] * d[0] + d[1] * d[1] <= spring.radius * spring.radius);
-        }
-    }
-    cells
+    let within = |middle: f32, size: usize| {
+        let end = (middle + spring.radius).floor().min(size as f32 - 1.0) as i32;
+        (middle - spring.radius).ceil().max(0.0) as i32..=end
+    };
+    within(spring.z, rows)
+        .flat_map(|z| within(spring.x, columns).map(move |x| [x, z]))
+        .filter(|[x, z]| {
+            let d = [*x as f32 - spring.x, *z as f32 - spring.z];
+            d[0] * d[0] + d[1] * d[1] <= spring.radius * spring.radius
+        })
+        .count() as u32
 }
 
 /// Refuses springs whose water would go nowhere.
@@ -840,7 +840,7 @@ impl Ground {
         [self.columns, self.rows]
     }
 
-    /// Records a change of the ground or its water, and wakes all tiles. Several may wait in one submission, between steps.
+    /// Records a change of the ground or its water, which wakes the tiles that it reaches. Several may wait in one submission, between steps.
     ///
     /// # Errors
     /// As [`GroundEdit::check`].

@@ -48,6 +48,30 @@ pub struct CloudLayer {
     pub seed: u32,
 }
 
+impl CloudLayer {
+    /// The layer of a deck, where no wind has moved it; without the deck's forms.
+    pub fn of(deck: &crate::clouds::CloudDeck) -> CloudLayer {
+        CloudLayer {
+            cell: [0; 3],
+            frac: [0.0; 3],
+            wavelength: deck.wavelength,
+            period: 1 << deck.period_doublings,
+            octaves: 6,
+            hurst: 1.0,
+            bottom: deck.bottom,
+            thickness: deck.thickness,
+            coverage: deck.coverage,
+            uniformity: deck.uniformity,
+            extinction: deck.extinction,
+            albedo: deck.albedo,
+            g_forward: deck.g_forward,
+            g_backward: deck.g_backward,
+            backward_share: deck.backward_share,
+            seed: deck.seed,
+        }
+    }
+}
+
 /// Light of the clouds along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CloudLight {

@@ -505,24 +505,7 @@ pub fn layer_light(
     if deck.is_empty() {
         return vec![[0.0, 0.0, 1.0]; rays.len()];
     }
-    let layer = super::clouds::CloudLayer {
-        cell: [0; 3],
-        frac: [0.0; 3],
-        wavelength: deck.wavelength,
-        period: 1 << deck.period_doublings,
-        octaves: 6,
-        hurst: 1.0,
-        bottom: deck.bottom,
-        thickness: deck.thickness,
-        coverage: deck.coverage,
-        uniformity: deck.uniformity,
-        extinction: deck.extinction,
-        albedo: deck.albedo,
-        g_forward: deck.g_forward,
-        g_backward: deck.g_backward,
-        backward_share: deck.backward_share,
-        seed: deck.seed,
-    };
+    let layer = super::clouds::CloudLayer::of(deck);
     let shape = deck.shape.as_ref().map(|s| super::clouds::CloudShape {
         kind: s.kind,
         kind_spread: s.kind_spread,

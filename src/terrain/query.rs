@@ -205,22 +205,8 @@ impl TerrainQuery {
                 rows.extend(footprint.to_le_bytes());
                 rows.extend([0; 4]);
             }
-            let exchange = Exchange::new(device, queue, &rows, part.len() * GROUND);
-            let groups = [
-                group(device, &layouts[0], &[self.field.as_entire_binding()]),
-                group(
-                    device,
-                    &layouts[1],
-                    &[
-                        exchange.input.as_entire_binding(),
-                        wgpu::BindingResource::TextureView(&self.relief.view),
-                    ],
-                ),
-                group(device, &layouts[2], &[exchange.output.as_entire_binding()]),
-            ];
-            let encoder = device.create_command_encoder(&Default::default());
-            let workgroups = part.len().div_ceil(64) as u32;
-            let data = exchange.run(device, queue, encoder, pipeline, &groups, workgroups)?;
+            let uniforms = [self.field.as_entire_binding()];
+            let data = self.exchanged((pipeline, layouts), &uniforms, &rows, part.len(), GROUND)?;
             results.extend(data.chunks_exact(GROUND).map(|row| Ground {
                 height: number(row, 0),
                 lost: number(row, 4),
@@ -350,7 +336,7 @@ impl TerrainQuery {
         else {
             return Ok(());
         };
-        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let queue = &self.gpu.queue;
         let block = field.block(Place {
             cell: [0; 2],
             frac: [0.0; 2],
@@ -391,34 +377,38 @@ impl TerrainQuery {
                 let altitude = ray.origin.altitude() as f32;
                 add(&[altitude, *near as f32, pixel_angle, 0.0]);
             }
-            let exchange = Exchange::new(device, queue, &rows, HIT * part.len());
-            let groups = [
-                group(
-                    device,
-                    &layouts[0],
-                    &[
-                        self.field.as_entire_binding(),
-                        self.course.as_entire_binding(),
-                    ],
-                ),
-                group(
-                    device,
-                    &layouts[1],
-                    &[
-                        exchange.input.as_entire_binding(),
-                        wgpu::BindingResource::TextureView(&self.relief.view),
-                    ],
-                ),
-                group(device, &layouts[2], &[exchange.output.as_entire_binding()]),
-            ];
-            let encoder = device.create_command_encoder(&Default::default());
-            let workgroups = part.len().div_ceil(64) as u32;
-            let data = exchange.run(device, queue, encoder, pipeline, &groups, workgroups)?;
+            let uniforms = [&self.field, &self.course].map(wgpu::Buffer::as_entire_binding);
+            let data = self.exchanged((pipeline, layouts), &uniforms, &rows, part.len(), HIT)?;
             for ((i, _), row) in part.iter().zip(data.chunks_exact(HIT)) {
                 hits[*i] = found(row);
             }
         }
         Ok(())
+    }
+
+    /// What a program finds for rows, `count` of them, `size` bytes each. Submits and waits.
+    fn exchanged(
+        &self,
+        (pipeline, layouts): (&wgpu::ComputePipeline, &[wgpu::BindGroupLayout]),
+        uniforms: &[wgpu::BindingResource<'_>],
+        rows: &[u8],
+        count: usize,
+        size: usize,
+    ) -> Result<Vec<u8>, Error> {
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let exchange = Exchange::new(device, queue, rows, count * size);
+        let read = [
+            exchange.input.as_entire_binding(),
+            wgpu::BindingResource::TextureView(&self.relief.view),
+        ];
+        let groups = [
+            group(device, &layouts[0], uniforms),
+            group(device, &layouts[1], &read),
+            group(device, &layouts[2], &[exchange.output.as_entire_binding()]),
+        ];
+        let encoder = device.create_command_encoder(&Default::default());
+        let workgroups = count.div_ceil(64) as u32;
+        exchange.run(device, queue, encoder, pipeline, &groups, workgroups)
     }
 
     /// Rays from one origin, over heights that are baked around it.

@@ -101,6 +101,9 @@ fn lit(
         });
     }
     let thickness = tables.atmosphere().thickness;
+    // As `Sky` has it.
+    let irradiance =
+        sun.irradiance * Vec3::from_array(tables.atmosphere().sun.colour.map(|c| c as f32));
     let rows: Vec<LightPlace> = places
         .iter()
         .map(|to_sun| LightPlace {
@@ -115,8 +118,8 @@ fn lit(
         .iter()
         .zip(places)
         .map(|(found, to_sun)| {
-            let direct = sun.irradiance * Vec3::from_array(found.sun);
-            let sky = sun.irradiance * Vec3::from_array(found.sky);
+            let direct = irradiance * Vec3::from_array(found.sun);
+            let sky = irradiance * Vec3::from_array(found.sky);
             let level = direct * (to_sun[1].max(0.0) as f32) + sky;
             TerrainLights {
                 sun: direct,

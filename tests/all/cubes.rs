@@ -563,24 +563,7 @@ fn clouds_with_forms_meet_quadrature() {
 fn shadows_of_clouds_meet_the_reference() {
     use veduta::reference::clouds as exact;
     let deck = CloudDeck::default();
-    let layer = exact::CloudLayer {
-        cell: [0; 3],
-        frac: [0.0; 3],
-        wavelength: deck.wavelength,
-        period: 1 << deck.period_doublings,
-        octaves: 6,
-        hurst: 1.0,
-        bottom: deck.bottom,
-        thickness: deck.thickness,
-        coverage: deck.coverage,
-        uniformity: deck.uniformity,
-        extinction: deck.extinction,
-        albedo: deck.albedo,
-        g_forward: deck.g_forward,
-        g_backward: deck.g_backward,
-        backward_share: deck.backward_share,
-        seed: deck.seed,
-    };
+    let layer = exact::CloudLayer::of(&deck);
     let to_sun = direction(0.8, 1.0).to_array();
     let mut random = Random::new(8, 3);
     let points: Vec<[f64; 3]> = (0..400)
@@ -816,24 +799,33 @@ impl Host {
                 .prepare(&gpu.queue, &mut encoder, view, &lights)
                 .unwrap();
         }
-        let target = self.texture.create_view(&Default::default());
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &target,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
-                ..Default::default()
-            });
+        self.over_black(encoder, |pass| {
             for k in order {
-                let _ = layers[*k].composite(&mut pass).unwrap();
+                let _ = layers[*k].composite(pass).unwrap();
             }
-        }
+        })
+    }
+
+    /// Draws over black and submits: the 16-bit words of the picture.
+    fn over_black(
+        &self,
+        mut encoder: wgpu::CommandEncoder,
+        draw: impl FnOnce(&mut wgpu::RenderPass<'_>),
+    ) -> Vec<u16> {
+        let gpu = gpu();
+        let target = self.texture.create_view(&Default::default());
+        draw(&mut encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            ..Default::default()
+        }));
         gpu.queue.submit([encoder.finish()]);
         let bytes = gpu.read_texture(&self.texture).unwrap();
         bytes
@@ -854,28 +846,8 @@ impl Host {
         let prepared = clouds
             .prepare(&gpu.queue, &mut encoder, view, lights)
             .unwrap();
-        let target = self.texture.create_view(&Default::default());
-        let drawn = {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &target,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
-                ..Default::default()
-            });
-            clouds.composite(&mut pass).unwrap()
-        };
-        gpu.queue.submit([encoder.finish()]);
-        let bytes = gpu.read_texture(&self.texture).unwrap();
-        let words = bytes
-            .chunks_exact(2)
-            .map(|b| u16::from_le_bytes([b[0], b[1]]))
-            .collect();
+        let mut drawn = veduta::Work::default();
+        let words = self.over_black(encoder, |pass| drawn = clouds.composite(pass).unwrap());
         (prepared, drawn, words)
     }
 }

@@ -3,7 +3,7 @@
 //! symbols  t distance along the view ray [m] · shear horizontal way of a sun's ray per metre of height [1]
 #define_import_path veduta::clouds::tile
 
-#import veduta::planet::shell::{altitude_along, shell_segment, clip_segment, segment_length, segment_distance}
+#import veduta::planet::shell::{ShellSegment, altitude_along, shell_segment, clip_segment, segment_length, segment_distance}
 #import veduta::clouds::integral::{mean_density}
 #import veduta::clouds::march::{CloudLight}
 
@@ -87,6 +87,50 @@ fn cells_at(cells: texture_3d<f32>, linear: sampler, layer: CloudTile, relative:
     return vec3<f32>(max(found.x + found.y * nu, 0.0), found.zw);
 }
 
+/// A view ray within a layer: its segment, the steps that it is taken in, and its altitudes, by a parabola about the middle of the segment.
+struct TilePath {
+    /// The stretch within the layer.
+    segment: ShellSegment,
+    /// Length in the layer [m].
+    size: f32,
+    /// Length of a step outside of clear air [m].
+    even: f32,
+    /// Steps at most.
+    count: i32,
+    /// Distance of the middle [m].
+    middle: f32,
+    /// Altitude of the middle [m].
+    level: f32,
+    /// Rise of the ray there [1].
+    rise: f32,
+    /// Half of what the planet bends away under it [1/m].
+    bend: f32,
+}
+
+/// The path of a view ray through a layer; `steps` are those of a ray that is eight times as long in the layer as the layer is thick.
+///
+/// internal
+fn tile_path(layer: CloudTile, ground_radius: f32, eye_altitude: f32, dir: vec3<f32>, max_distance: f32, steps: i32) -> TilePath {
+    let whole = shell_segment(ground_radius, layer.bottom, layer.bottom + layer.thickness, eye_altitude, dir.y);
+    let segment = clip_segment(whole, max_distance);
+    let size = segment_length(segment);
+    let share = sqrt(size / max(8.0 * layer.thickness, 1e-3));
+    let count = select(0, clamp(i32(ceil(f32(steps) * share)), 2, 4 * max(steps, 1)), size > 0.0);
+    let middle = 0.5 * (segment.near + segment.far);
+    let level = altitude_along(ground_radius, eye_altitude, dir.y, middle);
+    let radius = ground_radius + level;
+    let rise = clamp(((ground_radius + eye_altitude) * dir.y + middle) / radius, -1.0, 1.0);
+    return TilePath(segment, size, size / f32(max(count, 1)), count, middle, level, rise, 0.5 * (1.0 - rise * rise) / radius);
+}
+
+/// Altitude at a distance from the eye.
+///
+/// internal
+fn path_altitude(path: TilePath, distance: f32) -> f32 {
+    let off = distance - path.middle;
+    return path.level + off * (path.rise + off * path.bend);
+}
+
 /// Light of all orders of the cloud layer along a view ray up to `max_distance`, stepped as [`march_tile`] is, with a fetch more a step. The phase function is one
 /// part that turns light and a peak that hardly does; `kept` is what is left of the extinction without the peak, `nu` the cosine between view and sun.
 /// Ends when less than `min_transmittance` is left without the peak.
@@ -105,21 +149,10 @@ fn cells_at(cells: texture_3d<f32>, linear: sampler, layer: CloudTile, relative:
 /// source  ours
 fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: sampler, layer: CloudTile, kept: f32, nu: f32, ground_radius: f32, eye_altitude: f32,
     dir: vec3<f32>, max_distance: f32, min_transmittance: f32, steps: i32) -> OrderedLight {
-    let whole = shell_segment(ground_radius, layer.bottom, layer.bottom + layer.thickness, eye_altitude, dir.y);
-    let segment = clip_segment(whole, max_distance);
-    let size = segment_length(segment);
-    let share = sqrt(size / max(8.0 * layer.thickness, 1e-3));
-    let count = select(0, clamp(i32(ceil(f32(steps) * share)), 2, 4 * max(steps, 1)), size > 0.0);
-    let even = size / f32(max(count, 1));
-    let middle = 0.5 * (segment.near + segment.far);
-    let level = altitude_along(ground_radius, eye_altitude, dir.y, middle);
-    let radius = ground_radius + level;
-    let rise = clamp(((ground_radius + eye_altitude) * dir.y + middle) / radius, -1.0, 1.0);
-    let bend = 0.5 * (1.0 - rise * rise) / radius;
+    let path = tile_path(layer, ground_radius, eye_altitude, dir, max_distance, steps);
     let deepest = -log(max(min_transmittance, 1e-20)) / max(kept, 1e-3);
-    var t = segment_distance(segment, 0.0);
-    let before = t - middle;
-    var here = tile_at(tile, linear, layer, dir.xz * t, level + before * (rise + before * bend));
+    var t = segment_distance(path.segment, 0.0);
+    var here = tile_at(tile, linear, layer, dir.xz * t, path_altitude(path, t));
     var depth = 0.0;
     var reach = here.y;
     var lit = exp(-vec2<f32>(1.0, kept) * reach);
@@ -127,11 +160,10 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
     var once = vec2<f32>(0.0);
     var sent = vec3<f32>(0.0);
     var s = 0.0;
-    for (var i = 0; i < count && s < size && depth < deepest; i++) {
-        s = min(s + max(even, -layer.clear * here.x), size);
-        let at = segment_distance(segment, s);
-        let off = at - middle;
-        let next = tile_at(tile, linear, layer, dir.xz * at, level + off * (rise + off * bend));
+    for (var i = 0; i < path.count && s < path.size && depth < deepest; i++) {
+        s = min(s + max(path.even, -layer.clear * here.x), path.size);
+        let at = segment_distance(path.segment, s);
+        let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at));
         let added = mean_density(here.x, next.x) * layer.extinction * (at - t);
         depth += added;
         let ahead = depth + next.y;
@@ -141,8 +173,7 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
         once += added * mean;
         let through = exp(-kept * depth);
         let half_way = 0.5 * (at + t);
-        let between = half_way - middle;
-        sent += (left - through) * cells_at(cells, linear, layer, dir.xz * half_way, level + between * (rise + between * bend), nu);
+        sent += (left - through) * cells_at(cells, linear, layer, dir.xz * half_way, path_altitude(path, half_way), nu);
         left = through;
         lit = dim;
         reach = ahead;
@@ -169,22 +200,10 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
 /// source  ours
 fn march_tile(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, ground_radius: f32, eye_altitude: f32, dir: vec3<f32>, max_distance: f32,
     min_transmittance: f32, steps: i32) -> CloudLight {
-    let whole = shell_segment(ground_radius, layer.bottom, layer.bottom + layer.thickness, eye_altitude, dir.y);
-    let segment = clip_segment(whole, max_distance);
-    let size = segment_length(segment);
-    let share = sqrt(size / max(8.0 * layer.thickness, 1e-3));
-    let count = select(0, clamp(i32(ceil(f32(steps) * share)), 2, 4 * max(steps, 1)), size > 0.0);
-    let even = size / f32(max(count, 1));
-    // Altitudes by a parabola about the middle of the segment.
-    let middle = 0.5 * (segment.near + segment.far);
-    let level = altitude_along(ground_radius, eye_altitude, dir.y, middle);
-    let radius = ground_radius + level;
-    let rise = clamp(((ground_radius + eye_altitude) * dir.y + middle) / radius, -1.0, 1.0);
-    let bend = 0.5 * (1.0 - rise * rise) / radius;
+    let path = tile_path(layer, ground_radius, eye_altitude, dir, max_distance, steps);
     let deepest = -log(max(min_transmittance, 1e-20));
-    var t = segment_distance(segment, 0.0);
-    let before = t - middle;
-    var here = tile_at(tile, linear, layer, dir.xz * t, level + before * (rise + before * bend));
+    var t = segment_distance(path.segment, 0.0);
+    var here = tile_at(tile, linear, layer, dir.xz * t, path_altitude(path, t));
     var depth = 0.0;
     var left = 1.0;
     var lit = exp(-here.y);
@@ -193,11 +212,10 @@ fn march_tile(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, ground_r
     var weighted = 0.0;
     var samples = 0;
     var s = 0.0;
-    for (var i = 0; i < count && s < size && depth < deepest; i++) {
-        s = min(s + max(even, -layer.clear * here.x), size);
-        let at = segment_distance(segment, s);
-        let off = at - middle;
-        let next = tile_at(tile, linear, layer, dir.xz * at, level + off * (rise + off * bend));
+    for (var i = 0; i < path.count && s < path.size && depth < deepest; i++) {
+        s = min(s + max(path.even, -layer.clear * here.x), path.size);
+        let at = segment_distance(path.segment, s);
+        let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at));
         let added = mean_density(here.x, next.x) * layer.extinction * (at - t);
         depth += added;
         // Light at the end of the step, and its mean: the logarithmic one.
@@ -216,5 +234,5 @@ fn march_tile(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, ground_r
         samples += 1;
     }
     let weight = 1.0 - left;
-    return CloudLight(scatter, left, select(segment.near, weighted / max(weight, 1e-12), weight > 1e-6), samples, 0);
+    return CloudLight(scatter, left, select(path.segment.near, weighted / max(weight, 1e-12), weight > 1e-6), samples, 0);
 }

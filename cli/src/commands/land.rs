@@ -237,30 +237,9 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
             lights = TerrainLights::from_sky(device, queue, &query, tables, &sun, ground, albedo)?;
         }
     }
-    let texture = |format, usage| {
-        device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("picture"),
-            size: wgpu::Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: usage
-                | wgpu::TextureUsages::RENDER_ATTACHMENT
-                | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        })
-    };
-    let picture = texture(format, wgpu::TextureUsages::COPY_SRC);
-    let shown = texture(format, wgpu::TextureUsages::COPY_SRC);
-    let depth = texture(
-        wgpu::TextureFormat::Depth32Float,
-        wgpu::TextureUsages::empty(),
-    );
+    let texture = |format| crate::render::picture(device, args.size, format);
+    let (picture, shown) = (texture(format), texture(format));
+    let depth = texture(wgpu::TextureFormat::Depth32Float);
     let [picture_view, shown_view, depth_view] =
         [&picture, &shown, &depth].map(|t| t.create_view(&Default::default()));
     let finish = |encoder: wgpu::CommandEncoder| -> Result<(), CliError> {
