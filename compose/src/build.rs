@@ -64,7 +64,12 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
         "cloud_tile" => {
-            return vec![BTreeSet::new(), BTreeSet::from(["CLOUD_SHAPED".to_owned()])];
+            let kinds = [vec![], vec!["CLOUD_SHAPED"], vec!["CLOUD_COARSE"]];
+            return [vec![], vec!["CLOUD_WIDE"]]
+                .iter()
+                .flat_map(|bits| kinds.iter().map(move |kind| [&kind[..], bits].concat()))
+                .map(|flags| flags.into_iter().map(str::to_owned).collect())
+                .collect();
         }
         "ground_plan" | "ground_level" | "ground_shallow" | "ground_advance" | "ground_query"
         | "ground_surface" | "ground_normals" | "ground_picture" => {

@@ -195,8 +195,8 @@ impl CloudDeck {
         }
     }
 
-    /// Way without clouds for each unit that the density before its cut is below 0 (m): the noise seldom rises by more than its whole range over half a
-    /// wavelength of the first octave. Clouds with forms rise by their steepest slopes, which those of a kind's profile at its base are not.
+    /// Way without clouds for each unit that the density before its cut is below 0 (m): the noise seldom rises by more than its whole range over three
+    /// quarters of a wavelength of the first octave (measured: no picture is the worse for it). Clouds with forms rise by their steepest slopes, which those of a kind's profile at its base are not.
     pub(super) fn clear_way(&self) -> f64 {
         if let Some(shape) = &self.shape {
             let filled = 1.0 - self.uniformity;
@@ -204,7 +204,16 @@ impl CloudDeck {
             let slope = along + 8.0 / self.thickness.max(1.0);
             return 1.0 / (shape.sharpness * slope);
         }
-        0.5 * self.coverage * self.wavelength / (1.0 - self.uniformity).max(0.01)
+        0.75 * self.coverage * self.wavelength / (1.0 - self.uniformity).max(0.01)
+    }
+
+    /// The least density before its cut that a tile tells: it has 8 bits from there to 1. Steps in the clear are at most as long as it says.
+    pub(super) fn least_density(&self) -> f32 {
+        if self.shape.is_some() {
+            return -3.0;
+        }
+        let least = (1.0 - self.coverage) / self.coverage.max(1e-3);
+        -least.clamp(0.5, 3.0) as f32
     }
 
     /// Whether there is nothing to see of it.

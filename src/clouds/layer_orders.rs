@@ -48,7 +48,7 @@ impl<'a> LayerOrders<'a> {
         levels: u32,
         shortest: f64,
     ) -> Result<LayerOrders<'a>, Error> {
-        let (block, lobes) = block_of(deck, levels);
+        let (block, lobes) = block_of(deck, levels, 1.0);
         let (gain, momentum) = lobes.pace();
         let block = GridBlock {
             step: shortest as f32,
@@ -252,7 +252,7 @@ pub(super) fn ways(period: f32, thickness: f64, edge: usize, levels: usize) -> V
 }
 
 /// What is the same for every sun and grid.
-pub(super) fn block_of(deck: &CloudDeck, levels: u32) -> (GridBlock, Lobes) {
+pub(super) fn block_of(deck: &CloudDeck, levels: u32, least: f32) -> (GridBlock, Lobes) {
     let lobes = Lobes {
         albedo: deck.albedo,
         g_forward: deck.g_forward,
@@ -270,6 +270,7 @@ pub(super) fn block_of(deck: &CloudDeck, levels: u32) -> (GridBlock, Lobes) {
         thickness: deck.thickness as f32,
         ground_radius: deck.planet_radius as f32,
         levels: levels as f32,
+        least,
         ..Default::default()
     };
     (block, lobes)

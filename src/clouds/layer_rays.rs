@@ -94,7 +94,7 @@ pub fn layer_light(
         let textbook = path == ProbePath::Textbook;
         let shortest = deck.thickness / if textbook { 256.0 } else { 64.0 };
         let solver = LayerOrders::new(gpu, programs, deck, 64, shortest)?;
-        let tile = Tile::new(&gpu.device, programs, deck, &[512], 64)?;
+        let tile = Tile::new(&gpu.device, programs, deck, &[512], 64, true)?;
         let lighting = Lighting {
             sun: options.sun,
             around: options.around,
@@ -210,7 +210,7 @@ impl<'a> Query<'a> {
         let (pipeline, layouts) = compute(&gpu.device, programs, "cloud_probe", flags, &[])?;
         let tile = match kind {
             Kind::March => None,
-            _ => Some(Tile::new(&gpu.device, programs, deck, &[512], 64)?),
+            _ => Some(Tile::new(&gpu.device, programs, deck, &[512], 64, true)?),
         };
         Ok(Query {
             gpu,
@@ -256,6 +256,7 @@ impl<'a> Query<'a> {
                 detail: shape.detail as f32,
                 sharpness: shape.sharpness as f32,
                 weather_doublings: shape.weather_doublings,
+                least: 1.0,
                 ..Default::default()
             };
             let uniform = device.create_buffer(&wgpu::BufferDescriptor {

@@ -99,7 +99,7 @@ impl OrderTable {
         tile: &Tile,
         [edge, levels]: [u32; 2],
     ) -> Result<OrderTable, Error> {
-        let (block, lobes) = block_of(deck, tile.levels);
+        let (block, lobes) = block_of(deck, tile.levels, tile.least);
         let kernel = |flags: &[&str]| {
             let flags: Vec<&str> = [&["CLOUD_LAYERED"], flags].concat();
             compute(device, programs, "cloud_volume", &flags, &[])

@@ -12,6 +12,9 @@ use crate::programs::blocks::CloudDraw as DrawBlock;
 use crate::settings::Preset;
 use crate::view::View;
 
+/// Share of a pixel's width that a level of detail stands for: a pixel that covers more than 9 texels of the tile reads the next coarser level, and so on by twos.
+const MINIFIED: f32 = 0.15;
+
 /// Light that falls on the clouds, in the picture's own unit. A host that has an atmosphere takes it from its `SkyQuery`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CloudLights {
@@ -64,6 +67,8 @@ pub struct CloudQuality {
     pub frames: u32,
     /// Cells along the edge of the table of light of all orders, a multiple of 32 in [32, 128], and along its height, in [2, 64].
     pub cells: [u32; 2],
+    /// Whether texels of the tile have 16 bits a number instead of 8: twice the memory, for errors below a hundredth.
+    pub wide: bool,
 }
 
 impl CloudQuality {
@@ -83,6 +88,7 @@ impl CloudQuality {
             second_tile: true,
             frames: 30,
             cells: [32, cell_levels],
+            wide: false,
         }
     }
 
@@ -195,7 +201,7 @@ pub struct Clouds {
     /// Whether the first tile was baked in this frame.
     fresh: bool,
     /// Fields of `CloudTile` for the last eye.
-    placed: Option<[f32; 10]>,
+    placed: Option<[f32; 12]>,
     seen: bool,
 }
 
@@ -207,7 +213,7 @@ pub struct CloudShadow<'a> {
     /// Its sampler, which filters.
     pub sampler: &'a wgpu::Sampler,
     /// The fields of `CloudTile` in their order, for positions relative to the eye of the last [`Clouds::prepare`]; anew after each.
-    pub layer: [f32; 10],
+    pub layer: [f32; 12],
 }
 
 impl Clouds {
@@ -271,7 +277,14 @@ impl Clouds {
         } else {
             (texels, quality.levels)
         };
-        let tile = Tile::new(device, programs, &options.deck, &texels, levels)?;
+        let tile = Tile::new(
+            device,
+            programs,
+            &options.deck,
+            &texels,
+            levels,
+            quality.wide,
+        )?;
         let all = options.orders == Orders::All;
         let orders = if all && !options.deck.is_empty() {
             let table = OrderTable::new(device, programs, &options.deck, &tile, quality.cells)?;
@@ -578,6 +591,9 @@ impl Clouds {
                 0.0
             },
             clear: deck.clear_way() as f32,
+            coarse: MINIFIED * self.tile.texels[self.shown.map_or(0, |s| s.0)] as f32
+                / period as f32,
+            least: self.tile.least,
             ..Default::default()
         };
         self.placed = Some([
@@ -591,6 +607,8 @@ impl Clouds {
             block.levels,
             block.extinction,
             block.clear,
+            block.coarse,
+            block.least,
         ]);
         let bytes = block.to_bytes().to_vec();
         if bytes != self.held {

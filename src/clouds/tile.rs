@@ -13,15 +13,29 @@ pub const LOWEST_SUN: f32 = 0.121_869;
 /// Rows that are baked at once: what the buffer between program and texture holds.
 const ROWS: u32 = 8;
 
+/// Levels of detail beside the finest, of textures whose levels of height are a multiple of 8.
+const COARSE: u32 = 3;
+
+/// Bytes of a row of a level of detail in the buffer: copies want multiples of 256.
+fn row_bytes(texel: u32, texels: u32, detail: u32) -> u32 {
+    (texel * (texels >> detail)).next_multiple_of(256)
+}
+
 /// Textures of a layer with what bakes them.
 #[derive(Debug)]
 pub(super) struct Tile {
     pub levels: u32,
+    /// Bytes of a texel.
+    texel: u32,
+    /// What programs are told as the least density: 1 where texels have 16 bits a number.
+    pub least: f32,
     /// Texels of the edge of each texture.
     pub texels: Vec<u32>,
     pub views: Vec<wgpu::TextureView>,
     textures: Vec<wgpu::Texture>,
     pipeline: wgpu::ComputePipeline,
+    /// Makes the coarser levels of detail.
+    reduce: Vec<wgpu::ComputePipeline>,
     slots: Vec<(wgpu::Buffer, wgpu::BindGroup)>,
     target: wgpu::BindGroup,
     staging: wgpu::Buffer,
@@ -45,9 +59,21 @@ impl Tile {
         deck: &CloudDeck,
         texels: &[u32],
         levels: u32,
+        wide: bool,
     ) -> Result<Tile, Error> {
         let most = texels.iter().copied().max().unwrap_or(64);
-        let (pipeline, layouts) = compute(device, programs, "cloud_tile", deck.flags(), &[])?;
+        let bits: &[&str] = if wide { &["CLOUD_WIDE"] } else { &[] };
+        let texel = if wide { 4 } else { 2 };
+        let flags = [deck.flags(), bits].concat();
+        let (pipeline, layouts) = compute(device, programs, "cloud_tile", &flags, &[])?;
+        let details = if levels.is_multiple_of(8) { COARSE } else { 0 };
+        let reduce = (1..=details)
+            .map(|detail| {
+                let constants = [("CLOUD_DETAIL", f64::from(detail))];
+                let flags = [&["CLOUD_COARSE"], bits].concat();
+                Ok(compute(device, programs, "cloud_tile", &flags, &constants)?.0)
+            })
+            .collect::<Result<_, Error>>()?;
         let textures: Vec<wgpu::Texture> = texels
             .iter()
             .map(|&texels| {
@@ -58,10 +84,14 @@ impl Tile {
                         height: texels,
                         depth_or_array_layers: levels,
                     },
-                    mip_level_count: 1,
+                    mip_level_count: 1 + details,
                     sample_count: 1,
                     dimension: wgpu::TextureDimension::D3,
-                    format: wgpu::TextureFormat::Rg16Float,
+                    format: if wide {
+                        wgpu::TextureFormat::Rg16Float
+                    } else {
+                        wgpu::TextureFormat::Rg8Unorm
+                    },
                     usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
                     view_formats: &[],
                 })
@@ -77,7 +107,9 @@ impl Tile {
         };
         use wgpu::BufferUsages as Usage;
         let staging = buffer(
-            u64::from(4 * most * ROWS * levels),
+            (0..=details)
+                .map(|m| u64::from(row_bytes(texel, most, m) * (ROWS >> m) * (levels >> m)))
+                .sum(),
             Usage::STORAGE | Usage::COPY_SRC,
         );
         let group = |layout, buffer: &wgpu::Buffer| {
@@ -99,6 +131,8 @@ impl Tile {
             .collect();
         Ok(Tile {
             levels,
+            texel,
+            least: if wide { 1.0 } else { deck.least_density() },
             texels: texels.to_vec(),
             views: textures
                 .iter()
@@ -106,6 +140,7 @@ impl Tile {
                 .collect(),
             textures,
             pipeline,
+            reduce,
             slots,
             target: group(&layouts[2], &staging),
             staging,
@@ -132,11 +167,18 @@ impl Tile {
 
     pub fn texture_bytes(&self) -> u64 {
         let texels = |n: &u32| u64::from(*n) * u64::from(*n);
-        4 * u64::from(self.levels) * self.texels.iter().map(texels).sum::<u64>()
+        let finest =
+            u64::from(self.texel * self.levels) * self.texels.iter().map(texels).sum::<u64>();
+        (0..=self.details()).map(|m| finest >> (3 * m)).sum()
     }
 
     pub fn buffer_bytes(&self) -> u64 {
         self.staging.size() + self.slots.len() as u64 * RowsBlock::SIZE as u64
+    }
+
+    /// Levels of detail beside the finest.
+    fn details(&self) -> u32 {
+        self.reduce.len() as u32
     }
 
     /// Records the baking of a part of one of the textures.
@@ -176,6 +218,8 @@ impl Tile {
             detail: shape.detail as f32,
             sharpness: shape.sharpness as f32,
             weather_doublings: shape.weather_doublings,
+            least: self.least,
+            ..Default::default()
         };
         let (uniform, bound) = &self.slots[part as usize];
         let bytes = block.to_bytes();
@@ -185,33 +229,45 @@ impl Tile {
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, bound, &[]);
             pass.set_bind_group(2, &self.target, &[]);
-            pass.dispatch_workgroups((texels * rows).div_ceil(64), 1, 1);
+            pass.dispatch_workgroups((texels * rows * self.texel / 4).div_ceil(64), 1, 1);
+            for (reduce, detail) in self.reduce.iter().zip(1..) {
+                let words = (texels * rows * self.levels * self.texel / 4) >> (3 * detail);
+                pass.set_pipeline(reduce);
+                pass.dispatch_workgroups(words.div_ceil(64), 1, 1);
+            }
         }
-        encoder.copy_buffer_to_texture(
-            wgpu::TexelCopyBufferInfo {
-                buffer: &self.staging,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(4 * texels),
-                    rows_per_image: Some(rows),
+        let mut offset = 0;
+        for detail in 0..=self.details() {
+            let (bytes, rows) = (row_bytes(self.texel, texels, detail), rows >> detail);
+            let levels = self.levels >> detail;
+            encoder.copy_buffer_to_texture(
+                wgpu::TexelCopyBufferInfo {
+                    buffer: &self.staging,
+                    layout: wgpu::TexelCopyBufferLayout {
+                        offset,
+                        bytes_per_row: Some(bytes),
+                        rows_per_image: Some(rows),
+                    },
                 },
-            },
-            wgpu::TexelCopyTextureInfo {
-                origin: wgpu::Origin3d {
-                    x: 0,
-                    y: first,
-                    z: 0,
+                wgpu::TexelCopyTextureInfo {
+                    mip_level: detail,
+                    origin: wgpu::Origin3d {
+                        x: 0,
+                        y: first >> detail,
+                        z: 0,
+                    },
+                    ..self.textures[texture].as_image_copy()
                 },
-                ..self.textures[texture].as_image_copy()
-            },
-            wgpu::Extent3d {
-                width: texels,
-                height: rows,
-                depth_or_array_layers: self.levels,
-            },
-        );
+                wgpu::Extent3d {
+                    width: texels >> detail,
+                    height: rows,
+                    depth_or_array_layers: levels,
+                },
+            );
+            offset += u64::from(bytes * rows * levels);
+        }
         Work {
-            dispatches: 1,
+            dispatches: 1 + self.details(),
             writes: 1,
             bytes: bytes.len() as u64,
             ..Work::default()

@@ -4,6 +4,7 @@
 #define_import_path veduta::clouds::tile
 
 #import veduta::planet::shell::{ShellSegment, altitude_along, shell_segment, clip_segment, segment_length, segment_distance}
+#import veduta::clouds::code::{tile_value}
 #import veduta::clouds::integral::{mean_density}
 #import veduta::clouds::march::{CloudLight}
 
@@ -25,21 +26,27 @@ struct CloudTile {
     extinction: f32,
     /// Way that is free of clouds for each unit that the tile's density is below 0 [m].
     clear: f32,
+    /// A sample at a distance of d metres reads the tile's level of detail log2(d coarse) [1/m]; 0 for the finest always.
+    coarse: f32,
+    /// The least density that the tile tells [1].
+    least: f32,
 }
 
-/// Density before its cut at 0 and optical depth to the sun at a point given relative to the eye, whose altitude is `altitude`.
+/// Density before its cut at 0 and optical depth to the sun at a point given relative to the eye, whose altitude is `altitude`, `distance` from
+/// the eye.
 ///
 /// domain  relative in [-1e5, 1e5] m lin
 /// domain  altitude in [4000, 5500] m lin
+/// domain  distance in [0, 1e5] m lin
 /// range   [-1e3, 6.5e4] 1
 /// error   2e-2 abs of reference::clouds::uncut_density
 /// outside undefined
 /// source  ours
-fn tile_at(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: vec2<f32>, altitude: f32) -> vec2<f32> {
+fn tile_at(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: vec2<f32>, altitude: f32, distance: f32) -> vec2<f32> {
     let above = clamp(altitude - layer.bottom, 0.0, layer.thickness);
     let place = layer.place + (relative - layer.shear * above) * layer.tiles_per_metre;
     let level = (above / max(layer.thickness, 1e-3) * (layer.levels - 1.0) + 0.5) / layer.levels;
-    return textureSampleLevel(tile, linear, vec3<f32>(place, level), 0.0).xy;
+    return tile_value(textureSampleLevel(tile, linear, vec3<f32>(place, level), log2(max(distance * layer.coarse, 1.0))).xy, layer.least);
 }
 
 /// Share of the sun's light that the layer lets straight through to a point given relative to the eye, below, inside or above it.
@@ -53,7 +60,7 @@ fn tile_at(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: v
 fn cloud_shadow(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: vec2<f32>, altitude: f32) -> f32 {
     // Where the sun's ray meets the layer.
     let met = clamp(altitude, layer.bottom, layer.bottom + layer.thickness);
-    return exp(-tile_at(tile, linear, layer, relative + layer.shear * (met - altitude), met).y);
+    return exp(-tile_at(tile, linear, layer, relative + layer.shear * (met - altitude), met, 0.0).y);
 }
 
 /// Light of all orders along a ray through the layer, in parts that light and phase function weigh.
@@ -152,7 +159,7 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
     let path = tile_path(layer, ground_radius, eye_altitude, dir, max_distance, steps);
     let deepest = -log(max(min_transmittance, 1e-20)) / max(kept, 1e-3);
     var t = segment_distance(path.segment, 0.0);
-    var here = tile_at(tile, linear, layer, dir.xz * t, path_altitude(path, t));
+    var here = tile_at(tile, linear, layer, dir.xz * t, path_altitude(path, t), t);
     var depth = 0.0;
     var reach = here.y;
     var lit = exp(-vec2<f32>(1.0, kept) * reach);
@@ -161,9 +168,9 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
     var sent = vec3<f32>(0.0);
     var s = 0.0;
     for (var i = 0; i < path.count && s < path.size && depth < deepest; i++) {
-        s = min(s + max(path.even, -layer.clear * here.x), path.size);
+        s = min(s + max(path.even * (2.0 - left), -layer.clear * here.x), path.size);
         let at = segment_distance(path.segment, s);
-        let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at));
+        let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at), at);
         let added = mean_density(here.x, next.x) * layer.extinction * (at - t);
         depth += added;
         let ahead = depth + next.y;
@@ -185,7 +192,7 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
 
 /// Light of the cloud layer along a view ray up to `max_distance`, in steps of one fetch, for an albedo and a phase function of 1. `steps` are those of a
 /// ray that is eight times as long in the layer as the layer is thick; a longer ray takes more, a shorter one less, by the root of its length. Steps grow
-/// where the tile says that no cloud is near. Light and depth of a step are exact where its extinction is even and the depth to the sun changes
+/// where the tile says that no cloud is near, and to twice as long as less light is left. Light and depth of a step are exact where its extinction is even and the depth to the sun changes
 /// evenly. Ends when less than `min_transmittance` is left.
 ///
 /// domain  ground_radius in [3e6, 1e8] m log
@@ -203,7 +210,7 @@ fn march_tile(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, ground_r
     let path = tile_path(layer, ground_radius, eye_altitude, dir, max_distance, steps);
     let deepest = -log(max(min_transmittance, 1e-20));
     var t = segment_distance(path.segment, 0.0);
-    var here = tile_at(tile, linear, layer, dir.xz * t, path_altitude(path, t));
+    var here = tile_at(tile, linear, layer, dir.xz * t, path_altitude(path, t), t);
     var depth = 0.0;
     var left = 1.0;
     var lit = exp(-here.y);
@@ -213,9 +220,9 @@ fn march_tile(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, ground_r
     var samples = 0;
     var s = 0.0;
     for (var i = 0; i < path.count && s < path.size && depth < deepest; i++) {
-        s = min(s + max(path.even, -layer.clear * here.x), path.size);
+        s = min(s + max(path.even * (2.0 - left), -layer.clear * here.x), path.size);
         let at = segment_distance(path.segment, s);
-        let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at));
+        let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at), at);
         let added = mean_density(here.x, next.x) * layer.extinction * (at - t);
         depth += added;
         // Light at the end of the step, and its mean: the logarithmic one.

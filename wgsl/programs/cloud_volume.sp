@@ -16,6 +16,7 @@ orders a table of depth and angle holds.
 #import veduta::clouds::tile::{CloudTile, tile_at}
 #import veduta::planet::shell::{shell_segment, clip_segment, segment_length, segment_distance, altitude_along, ground_distance, direction_cosine_along}
 #endif
+#import veduta::math::half::{half_word}
 #import veduta::math::series::{one_minus_exp, one_minus_exp_over_x}
 
 struct CloudGrid {
@@ -60,6 +61,8 @@ struct CloudGrid {
     // What a step towards the next order is taken by, and how far the step before is gone on with.
     gain: f32,
     momentum: f32,
+    // The least density that the tile tells.
+    least: f32,
 }
 
 @group(0) @binding(0) var<uniform> grid: CloudGrid;
@@ -75,8 +78,8 @@ fn cell_index(at: vec3<i32>, n: vec3<i32>) -> i32 {
 }
 
 fn sampled(relative: vec2<f32>, altitude: f32) -> vec2<f32> {
-    let layer = CloudTile(vec2<f32>(0.0), grid.shear, 1.0 / grid.size, grid.bottom, grid.thickness, grid.levels, grid.extinction, 0.0);
-    return tile_at(tile, linear, layer, relative, altitude);
+    let layer = CloudTile(vec2<f32>(0.0), grid.shear, 1.0 / grid.size, grid.bottom, grid.thickness, grid.levels, grid.extinction, 0.0, 0.0, grid.least);
+    return tile_at(tile, linear, layer, relative, altitude, 0.0);
 }
 #else
 fn cell_index(at: vec3<i32>, n: vec3<i32>) -> i32 {
@@ -450,11 +453,6 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
 @group(1) @binding(11) var<storage, read> from_below: array<vec4<f32>>;
 @group(2) @binding(7) var<storage, read_write> texels: array<vec2<u32>>;
 
-// The bits of a number from -65,000 to 65,000 as a 16-bit float, rounded; what is within 6e-5 of 0 may become 0.
-fn half(x: f32) -> u32 {
-    return ((bitcast<u32>(abs(x) * 1.92592994e-34) + 0x1000u) >> 13u) | select(0u, 0x8000u, x < 0.0);
-}
-
 // A texel a cell: what it scatters of the sun's light evenly, and for each unit of the cosine between view and sun; of the light from above, and from below.
 @compute @workgroup_size(64)
 fn publish(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -467,7 +465,7 @@ fn publish(@builtin(global_invocation_id) id: vec3<u32>) {
     let along = -0.48860251 * dot(found.wyz, grid.to_sun);
     let even = 0.28209479 * vec3<f32>(found.x, from_above[4 * i].x, from_below[4 * i].x);
     let at = vec3<i32>(i % n.x, (i / n.x) % n.y, i / (n.x * n.y));
-    texels[(at.y * n.z + at.z) * n.x + at.x] = vec2<u32>(half(even.x) | (half(along) << 16u), half(even.y) | (half(even.z) << 16u));
+    texels[(at.y * n.z + at.z) * n.x + at.x] = vec2<u32>(half_word(vec2<f32>(even.x, along)), half_word(even.yz));
 }
 #else
 #ifdef CLOUD_LAYERED
