@@ -71,12 +71,10 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 .map(|flags| flags.into_iter().map(str::to_owned).collect())
                 .collect();
         }
-        "ground_plan" | "ground_level" | "ground_shallow" | "ground_advance" | "ground_query"
+        "ground_plan" | "ground_level" | "ground_edit" | "ground_range" | "ground_shape"
+        | "ground_smooth" | "ground_shallow" | "ground_advance" | "ground_query"
         | "ground_surface" | "ground_normals" | "ground_picture" => {
             return vec![BTreeSet::new()];
-        }
-        "ground_edit" => {
-            return vec![BTreeSet::new(), BTreeSet::from(["GROUND_LEVEL".to_owned()])];
         }
         "ground_speeds" | "ground_transport" => {
             return vec![

@@ -7,6 +7,7 @@ mod camera;
 mod options;
 mod picture;
 mod scene;
+mod shape;
 mod state;
 mod system;
 

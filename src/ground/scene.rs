@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::camera::GroundCamera;
-use super::options::{Erosion, GroundOptions};
+use super::options::{Boundary, Erosion, GroundOptions};
 use super::picture::GroundLook;
+use super::shape::Form;
 use super::state::{CHANNELS, GroundState};
 use crate::device::Gpu;
 use crate::error::Error;
@@ -75,7 +76,7 @@ pub struct GroundScene {
     pub relief: f64,
     /// Added everywhere (m), in [-1e4, 1e4].
     pub altitude: f64,
-    /// Passes of smoothing, in [0, 1000].
+    /// Passes of smoothing, in [0, 1000]: each cell becomes the mean of itself and its eight neighbours, over the edges where the boundary is `Periodic`.
     pub smooth: u32,
     /// Water stands up to this altitude (m) in the first columns.
     pub water_level: Option<f64>,
@@ -224,9 +225,10 @@ impl GroundScene {
     }
 
     /// Sets a key, which is a field's name in upper case; RAIN, EVAPORATION and SEEPAGE in mm/h; SPRING adds one by `x,z,radius,rate`, `none` takes all away; EROSION is `on` or `off`.
+    /// Whether a number is allowed is said by [`GroundScene::check`].
     ///
     /// # Errors
-    /// [`Error::UnknownKey`], [`Error::WrongType`].
+    /// [`Error::UnknownKey`], [`Error::WrongType`]; [`Error::OutOfDomain`] for a SEED of a ground without a field.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), Error> {
         let real = || parse::<f64>(key, value, "a number");
         let single = || parse::<f32>(key, value, "a number");
@@ -254,9 +256,15 @@ impl GroundScene {
             "SMOOTH" => self.smooth = whole()?,
             "SEED" => {
                 let seed = whole()?;
-                if let Some(field) = &mut self.field {
-                    field.seed = seed;
-                }
+                let Some(field) = &mut self.field else {
+                    return Err(Error::OutOfDomain {
+                        name: key.to_owned(),
+                        value: value.to_owned(),
+                        domain: "left out for a ground without a field, which has no seed"
+                            .to_owned(),
+                    });
+                };
+                field.seed = seed;
             }
             "WATER_LEVEL" => {
                 self.water_level = if value.trim() == "none" {
@@ -397,7 +405,7 @@ impl GroundScene {
         Ok(())
     }
 
-    /// How it begins. Heights of the field are found on the device: submits and waits.
+    /// How it begins. Heights of the field, shape and smoothing are found on the device: submits and waits.
     ///
     /// # Errors
     /// As [`GroundScene::check`], [`heights`], a height map without values, and [`GroundState::from_channels`].
@@ -405,7 +413,7 @@ impl GroundScene {
         self.check()?;
         let (columns, rows) = (self.columns as usize, self.rows as usize);
         let spacing = f64::from(self.options.spacing);
-        let mut ground = vec![0.0_f64; columns * rows];
+        let mut ground = vec![0.0_f32; columns * rows];
         if let Some(field) = &self.field {
             let places: Vec<WorldPos> = (0..rows * columns)
                 .map(|k| {
@@ -416,24 +424,24 @@ impl GroundScene {
                 .collect();
             let found = heights(gpu, programs, field, &places, spacing as f32)?;
             for (to, from) in ground.iter_mut().zip(&found) {
-                *to = f64::from(from.height);
+                *to = from.height;
             }
         }
         if let Some(map) = &self.heights {
             let found = map.heights(self.columns as i32, self.rows as i32)?;
             for (to, from) in ground.iter_mut().zip(found) {
-                *to += from;
+                *to = (f64::from(*to) + from) as f32;
             }
         }
-        for (k, height) in ground.iter_mut().enumerate() {
-            let x = ((k % columns) as f64 + 0.5) / columns as f64;
-            let z = ((k / columns) as f64 + 0.5) / rows as f64;
-            *height += self.altitude + self.relief * self.shape.share(x, z);
-        }
-        for _ in 0..self.smooth {
-            ground = smoothed(&ground, columns, rows);
-        }
-        let heights: Vec<f32> = ground.iter().map(|h| *h as f32).collect();
+        let form = Form {
+            size: [columns, rows],
+            shape: self.shape,
+            relief: self.relief,
+            altitude: self.altitude,
+            smooth: self.smooth,
+            wraps: self.options.boundary == Boundary::Periodic,
+        };
+        let heights = form.applied(gpu, programs, &ground)?;
         let mut state = GroundState::from_heights(columns, rows, &heights)?;
         let wet = (self.water_share * columns as f64).round() as usize;
         for (k, cell) in state.cells.chunks_exact_mut(CHANNELS).enumerate() {
@@ -448,19 +456,4 @@ impl GroundScene {
         }
         Ok(state)
     }
-}
-
-/// Every cell the mean of itself and its neighbours, weighted by 4, 2 and 1.
-fn smoothed(ground: &[f64], columns: usize, rows: usize) -> Vec<f64> {
-    let at = |x: usize, z: usize| ground[z * columns + x];
-    (0..rows * columns)
-        .map(|k| {
-            let (x, z) = (k % columns, k / columns);
-            let (l, r) = (x.saturating_sub(1), (x + 1).min(columns - 1));
-            let (d, u) = (z.saturating_sub(1), (z + 1).min(rows - 1));
-            let sides = (at(l, z) + at(r, z)) + (at(x, d) + at(x, u));
-            let corners = (at(l, d) + at(r, u)) + (at(l, u) + at(r, d));
-            (4.0 * at(x, z) + 2.0 * sides + corners) / 16.0
-        })
-        .collect()
 }

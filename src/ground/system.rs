@@ -40,6 +40,8 @@ pub struct GroundReport {
     pub tile_steps: u64,
     /// Length of the last step (s).
     pub last_step: f64,
+    /// Least and greatest height that the ground has had (m): within 5e-7 of the heights' parts, never narrower.
+    pub heights: [f64; 2],
 }
 
 #[derive(Debug)]
@@ -54,8 +56,9 @@ impl Pass {
         programs: &ProgramSet,
         name: &str,
         features: &[&str],
+        constants: &[(&str, f64)],
     ) -> Result<Pass, Error> {
-        let (pipeline, layouts) = compute(device, programs, name, features, &[])?;
+        let (pipeline, layouts) = compute(device, programs, name, features, constants)?;
         Ok(Pass { pipeline, layouts })
     }
 
@@ -84,6 +87,8 @@ impl Pass {
 #[derive(Debug)]
 struct Bound {
     pass: Pass,
+    /// The same without rain and springs, where it has them.
+    calm: Option<wgpu::ComputePipeline>,
     groups: [Vec<wgpu::BindGroup>; 2],
 }
 
@@ -105,6 +110,18 @@ struct Planes {
     arguments: wgpu::Buffer,
     step: wgpu::Buffer,
     springs: wgpu::Buffer,
+    extremes: wgpu::Buffer,
+}
+
+/// Least and greatest of the heights that strips have noted in their books.
+fn extremes_of(books: &[u32]) -> [f32; 2] {
+    let books = books.as_chunks::<BOOK>().0.iter();
+    books.fold([3e38, -3e38], |[low, high], book| {
+        [
+            f32::from_bits(book[10]).min(low),
+            f32::from_bits(book[11]).max(high),
+        ]
+    })
 }
 
 /// How many cells of the grid a spring wells up in.
@@ -209,6 +226,9 @@ pub struct GroundPoint {
 #[derive(Debug)]
 pub struct GroundQuery {
     staging: wgpu::Buffer,
+    /// Changes that were recorded before it: states and edits.
+    state: u64,
+    edits: u64,
     mapped: Option<std::sync::mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>>,
 }
 
@@ -251,7 +271,10 @@ impl GroundQuery {
             .map_err(|e| Error::Device(e.to_string()))?
             .to_vec();
         self.staging.unmap();
-        let points: Vec<GroundPoint> = bytes
+        let (points, extremes) = bytes.split_at(bytes.len() - 8);
+        let extremes = extremes.as_chunks::<4>().0;
+        ground.learn(self, [0, 1].map(|k| f32::from_le_bytes(extremes[k])));
+        let points: Vec<GroundPoint> = points
             .as_chunks::<32>()
             .0
             .iter()
@@ -267,12 +290,6 @@ impl GroundQuery {
                 }
             })
             .collect();
-        for point in &points {
-            ground.range = [
-                ground.range[0].min(point.height),
-                ground.range[1].max(point.height),
-            ];
-        }
         Ok(Some(points))
     }
 }
@@ -308,7 +325,13 @@ pub struct Ground {
     parity: usize,
     edit: Tools,
     query: Pass,
-    range: [f32; 2],
+    extremes: Pass,
+    /// Least and greatest height so far as the device has told.
+    known: [f32; 2],
+    /// What they may be after each edit since, by its number: each holds those before.
+    maybe: Vec<(u64, [f32; 2])>,
+    states: u64,
+    edits: u64,
     changes: u64,
 }
 
@@ -331,7 +354,7 @@ impl Ground {
         let groups = columns.div_ceil(4);
         let tiles_x = columns.div_ceil(TILE);
         let tiles = tiles_x * rows.div_ceil(TILE);
-        let pair = (2 * tiles * TILE * TILE * 4) as u64;
+        let pair = (2 * 4 * groups * rows * 4) as u64;
         let limits = device.limits();
         let available = limits
             .max_storage_buffer_binding_size
@@ -374,13 +397,20 @@ impl Ground {
             arguments: buffer("veduta arguments", 16, Usage::STORAGE | Usage::INDIRECT),
             step: buffer("veduta step", 144, Usage::UNIFORM),
             springs: buffer("veduta springs", 64, Usage::UNIFORM),
+            extremes: buffer("veduta extremes", 8, Usage::STORAGE),
         };
         let features: &[&str] = if options.erosion.is_some() {
             &["GROUND_EROSION"]
         } else {
             &[]
         };
-        let pass = |name| Pass::new(device, programs, name, features);
+        let pass = |name| Pass::new(device, programs, name, features, &[]);
+        let calm = |name| -> Result<Option<wgpu::ComputePipeline>, Error> {
+            let constants = [("GROUND_FRESH", 0.0)];
+            Ok(Some(
+                Pass::new(device, programs, name, features, &constants)?.pipeline,
+            ))
+        };
         let p = &planes;
         let plan = pass("ground_plan")?;
         let plan_groups = || {
@@ -435,10 +465,12 @@ impl Ground {
             });
             first = Bound {
                 pass: one,
+                calm: calm("ground_shallow")?,
                 groups: groups_one,
             };
             second = Bound {
                 pass: two,
+                calm: calm("ground_advance")?,
                 groups: groups_two,
             };
             level = None;
@@ -487,6 +519,7 @@ impl Ground {
                     });
                     Some(Bound {
                         pass: three,
+                        calm: None,
                         groups,
                     })
                 }
@@ -494,18 +527,26 @@ impl Ground {
             };
             first = Bound {
                 pass: one,
+                calm: None,
                 groups: groups_one,
             };
             second = Bound {
                 pass: two,
+                calm: calm("ground_transport")?,
                 groups: groups_two,
             };
         }
         let edit = Tools {
             edit: pass("ground_edit")?,
-            level: Pass::new(device, programs, "ground_edit", &["GROUND_LEVEL"])?,
+            level: Pass::new(
+                device,
+                programs,
+                "ground_level",
+                &[],
+                &[("GROUND_ALL", 1.0)],
+            )?,
         };
-        let query = pass("ground_query")?;
+        let (query, extremes) = (pass("ground_query")?, pass("ground_range")?);
         let mut ground = Ground {
             options: options.clone(),
             columns,
@@ -517,6 +558,7 @@ impl Ground {
             planes,
             plan: Bound {
                 pass: plan,
+                calm: None,
                 groups: plan_groups,
             },
             first,
@@ -525,7 +567,11 @@ impl Ground {
             parity: 0,
             edit,
             query,
-            range: [0.0; 2],
+            extremes,
+            known: [0.0; 2],
+            maybe: Vec::new(),
+            states: 0,
+            edits: 0,
             changes: 0,
         };
         ground.set_state(queue, state)?;
@@ -549,6 +595,7 @@ impl Ground {
             &p.arguments,
             &p.step,
             &p.springs,
+            &p.extremes,
         ];
         let mut bytes: u64 = all.iter().map(|b| b.size()).sum();
         bytes +=
@@ -586,15 +633,17 @@ impl Ground {
         Ok(())
     }
 
-    /// Floats a plane: whole tiles.
+    /// Floats a plane: rows of whole vectors.
     fn plane(&self) -> usize {
-        self.tiles * TILE * TILE
+        4 * self.groups * self.rows
     }
 
-    /// Where a cell is in a plane: tile after tile, rows of a tile one after the other, so that memory is read in the order in which it lies.
+    /// Where a cell is in a plane: tile after tile, rows of a tile one after the other, so that memory is read in the order in which it lies. The last tiles are as narrow as the grid.
     fn place_of(&self, x: usize, z: usize) -> usize {
-        let tile = (z / TILE) * self.tiles_x + x / TILE;
-        (tile * TILE + z % TILE) * TILE + x % TILE
+        let [above, before] = [z, x].map(|n| n / TILE * TILE);
+        let wide = 4 * self.groups;
+        let tile = above * wide + before * TILE.min(self.rows - above);
+        tile + (z - above) * TILE.min(wide - before) + (x - before)
     }
 
     fn wake(&self, queue: &wgpu::Queue) {
@@ -766,20 +815,38 @@ impl Ground {
             send(load, &pair(&|x, z| at(x, z, 2), &|x, z| at(x, z, 11)));
             send(change, &pair(&|x, z| at(x, z, 8), &|x, z| at(x, z, 9)));
         }
-        queue.write_buffer(&p.tiles, 0, &vec![0; p.tiles.size() as usize]);
         // As a step finds it: of the source's scheme nothing asks for it.
         let fastest = faces
             .iter()
             .zip(checked.cells.chunks_exact(CHANNELS))
             .map(|(face, c)| face.abs() + (self.options.gravity * c[1]).max(0.0).sqrt())
             .fold(0.0, f32::max);
-        let tops: Vec<u8> = std::iter::repeat_n(fastest.to_le_bytes(), self.tiles)
-            .flatten()
-            .collect();
-        queue.write_buffer(&p.tiles, 4 * (CONTROL + self.tiles) as u64, &tops);
+        let mut words = vec![0_u32; p.tiles.size() as usize / 4];
+        words[CONTROL + self.tiles..CONTROL + 2 * self.tiles].fill(fastest.to_bits());
+        // What each strip has had, as `ground_level` notes it.
+        let books = CONTROL + 3 * self.tiles;
+        for book in words[books..].as_chunks_mut::<BOOK>().0 {
+            [book[10], book[11]] = [3e38_f32.to_bits(), (-3e38_f32).to_bits()];
+        }
+        for z in 0..self.rows {
+            for x in 0..self.columns {
+                let (base, more) = (at(x, z, 0) - self.reference, at(x, z, 8));
+                let (height, slack) = (base + more, 2.4e-7 * (base.abs() + more.abs()));
+                let tile = z / TILE * self.tiles_x + x / TILE;
+                let book = books + (8 * tile + x % TILE / 4) * BOOK;
+                let least = f32::from_bits(words[book + 10]).min(height - slack);
+                let most = f32::from_bits(words[book + 11]).max(height + slack);
+                [words[book + 10], words[book + 11]] = [least.to_bits(), most.to_bits()];
+            }
+        }
+        let extremes = extremes_of(&words[books..]);
+        let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
+        queue.write_buffer(&p.tiles, 0, &bytes);
         self.parity = 0;
         self.changes += 1;
-        self.range = [low, high];
+        self.states += 1;
+        self.known = self.over(extremes);
+        self.maybe.clear();
         self.upload(queue);
         self.wake(queue);
         Ok(())
@@ -801,7 +868,13 @@ impl Ground {
                 (self.level.as_ref(), true),
             ] {
                 let Some(bound) = bound else { continue };
-                pass.set_pipeline(&bound.pass.pipeline);
+                let pipeline = match &bound.calm {
+                    Some(calm) if self.options.rain == 0.0 && self.options.springs.is_empty() => {
+                        calm
+                    }
+                    _ => &bound.pass.pipeline,
+                };
+                pass.set_pipeline(pipeline);
                 for (group, index) in bound.groups[self.parity].iter().zip(0..) {
                     pass.set_bind_group(index, group, &[]);
                 }
@@ -897,18 +970,24 @@ impl Ground {
                 &t.level,
                 [
                     t.level.group(device, 0, &[(0, &p.step)]),
-                    t.level.group(device, 1, &[(0, &p.load[1])]),
+                    t.level.group(device, 1, &[(0, &p.load[1]), (2, &p.tiles)]),
                     t.level.group(device, 2, &[(0, &p.ground)]),
                 ],
             ),
         ];
+        let workgroups = [
+            [(self.groups as u32).div_ceil(64), self.rows as u32],
+            [self.tiles as u32, 1],
+        ];
+        // Water leaves the ground as it is.
+        let count = if edit.tool == Tool::Water { 1 } else { 2 };
         let mut pass = encoder.begin_compute_pass(&Default::default());
-        for (tool, groups) in &sets {
+        for ((tool, groups), [x, y]) in sets.iter().zip(workgroups).take(count) {
             pass.set_pipeline(&tool.pipeline);
             for (group, index) in groups.iter().zip(0..) {
                 pass.set_bind_group(index, group, &[]);
             }
-            pass.dispatch_workgroups((self.groups as u32).div_ceil(64), self.rows as u32, 1);
+            pass.dispatch_workgroups(x, y, 1);
         }
         drop(pass);
         if self.options.scheme == Scheme::Physical && edit.tool == Tool::Water {
@@ -921,28 +1000,119 @@ impl Ground {
                 size,
             );
         }
-        let [low, high] = self.range;
-        self.range = match edit.tool {
+        let [low, high] = self.range();
+        let most = edit.strength.abs();
+        let maybe = match edit.tool {
             Tool::Raise => [low + edit.strength.min(0.0), high + edit.strength.max(0.0)],
-            Tool::Noise { .. } => [low - edit.strength.abs(), high + edit.strength.abs()],
+            Tool::Noise { .. } => [low - most, high + most],
             Tool::Flatten { height } => [low.min(height), high.max(height)],
             Tool::Smooth | Tool::Water => [low, high],
         };
+        self.edits += 1;
+        if self.maybe.len() >= 64 {
+            // The later ones hold it.
+            let _ = self.maybe.remove(0);
+        }
+        // Sums of floats, rounded outwards.
+        self.maybe.push((
+            self.edits,
+            [
+                maybe[0].next_down().next_down(),
+                maybe[1].next_up().next_up(),
+            ],
+        ));
         Ok(Work {
-            dispatches: 2,
+            dispatches: count as u32,
             writes: 1,
             bytes: 32,
             ..Default::default()
         })
     }
 
-    /// Least and greatest height that the ground has had (m): of the state that was set, widened by raising and by what queries find; it never narrows.
+    /// Least and greatest height that the ground has had since its state was set (m), never narrower than the ground itself was then: as the device found it where the last answer that was taken
+    /// ([`Ground::query`], [`Ground::query_range`]) was recorded, widened by what edits since may have done. What steps have dug, laid down or let slide since then is not in it.
     pub fn range(&self) -> [f32; 2] {
-        self.range
+        let [low, high] = self.known;
+        self.maybe
+            .last()
+            .map_or([low, high], |(_, [a, b])| [low.min(*a), high.max(*b)])
     }
 
-    /// Records a query at places in columns and rows (fractions between cells; beyond the edges those of the edge). After the submission
-    /// [`GroundQuery::take`] has the answer when the device has.
+    /// Takes what the device has found for a query.
+    fn learn(&mut self, query: &GroundQuery, extremes: [f32; 2]) {
+        if query.state != self.states {
+            return;
+        }
+        let [low, high] = self.over(extremes);
+        self.known = [self.known[0].min(low), self.known[1].max(high)];
+        self.maybe.retain(|(edit, _)| *edit > query.edits);
+    }
+
+    /// Extremes over the reference level as heights, rounded outwards.
+    fn over(&self, [low, high]: [f32; 2]) -> [f32; 2] {
+        let exact = [low, high].map(|v| f64::from(v) + f64::from(self.reference));
+        let [a, b] = exact.map(|v| v as f32);
+        [
+            if f64::from(a) > exact[0] {
+                a.next_down()
+            } else {
+                a
+            },
+            if f64::from(b) < exact[1] {
+                b.next_up()
+            } else {
+                b
+            },
+        ]
+    }
+
+    /// Records a query of nothing but the least and greatest height so far: once its answer (no points) is taken, [`Ground::range`] has them.
+    pub fn query_range(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> GroundQuery {
+        let staging = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("veduta ground range"),
+            size: 8,
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        self.record_range(device, encoder, &staging, 0);
+        GroundQuery {
+            staging,
+            state: self.states,
+            edits: self.edits,
+            mapped: None,
+        }
+    }
+
+    fn record_range(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        staging: &wgpu::Buffer,
+        at: u64,
+    ) {
+        let (p, e) = (&self.planes, &self.extremes);
+        let groups = [
+            e.group(device, 0, &[(0, &p.step)]),
+            e.group(device, 1, &[(0, &p.tiles)]),
+            e.group(device, 2, &[(0, &p.extremes)]),
+        ];
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&e.pipeline);
+            for (group, index) in groups.iter().zip(0..) {
+                pass.set_bind_group(index, group, &[]);
+            }
+            pass.dispatch_workgroups(1, 1, 1);
+        }
+        encoder.copy_buffer_to_buffer(&p.extremes, 0, staging, at, 8);
+    }
+
+    /// Records a query at places in columns and rows (fractions between cells; beyond the edges those of the edge, or of the other edge where the boundary is `Periodic`), and of the least and greatest
+    /// height. After the submission [`GroundQuery::take`] has the answer when the device has.
     ///
     /// # Errors
     /// [`Error::OutOfDomain`] for no places, more than 65,536, and places that are not finite.
@@ -980,7 +1150,7 @@ impl Ground {
         let rows = buffer(bytes.len(), Usage::STORAGE | Usage::COPY_DST);
         queue.write_buffer(&rows, 0, &bytes);
         let found = buffer(32 * places.len(), Usage::STORAGE | Usage::COPY_SRC);
-        let staging = buffer(32 * places.len(), Usage::COPY_DST | Usage::MAP_READ);
+        let staging = buffer(32 * places.len() + 8, Usage::COPY_DST | Usage::MAP_READ);
         let (p, q) = (&self.planes, &self.query);
         let groups = [
             q.group(device, 0, &[(0, &p.step)]),
@@ -1005,9 +1175,12 @@ impl Ground {
             }
             pass.dispatch_workgroups((places.len() as u32).div_ceil(64), 1, 1);
         }
-        encoder.copy_buffer_to_buffer(&found, 0, &staging, 0, staging.size());
+        encoder.copy_buffer_to_buffer(&found, 0, &staging, 0, found.size());
+        self.record_range(device, encoder, &staging, found.size());
         Ok(GroundQuery {
             staging,
+            state: self.states,
+            edits: self.edits,
             mapped: None,
         })
     }
@@ -1157,6 +1330,8 @@ impl Ground {
             tiles: self.tiles as u32,
             tile_steps: u64::from(words[7]) << 32 | u64::from(words[6]),
             last_step: real(1),
+            heights: extremes_of(&words[CONTROL + 3 * self.tiles..])
+                .map(|v| f64::from(v) + f64::from(self.reference)),
         })
     }
 }

@@ -1,5 +1,7 @@
 //! The living ground in f64: the functions of its modules one cell at a time, and one step of either scheme, written from the formulas.
 
+use super::noise::value_noise_2d;
+
 /// Difference of two levels, nothing within the last places of the higher one and of the water.
 pub fn level_drop(level: f64, beside: f64, water: f64) -> f64 {
     let drop = level - beside;
@@ -71,6 +73,116 @@ pub fn dissolved(load: f64, most: f64, softness: f64, depth: f64, dig: f64, lay:
 pub fn slid(ground: f64, beside: f64, steepest: f64, rate: f64) -> f64 {
     let above = beside - ground;
     rate * ((above - steepest).max(0.0) - (-above - steepest).max(0.0))
+}
+
+/// A smooth bump of height 1 that ends at 1.
+pub fn bump(r: f64) -> f64 {
+    let t = (1.0 - r.abs()).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// Share of the relief of a plain with a river bed.
+pub fn bed_share(x: f64, z: f64) -> f64 {
+    let middle = 0.2 * (4.0 * std::f64::consts::PI * x).sin();
+    -0.5 * x - 0.5 * bump((2.0 * z - 1.0 - middle) / 0.1)
+}
+
+/// A height smoothed by its neighbours at the sides and at the corners.
+pub fn smoothed_height(height: f64, sides: [f64; 4], corners: [f64; 4]) -> f64 {
+    let sum = |all: [f64; 4]| all.iter().sum::<f64>();
+    (4.0 * height + 2.0 * sum(sides) + sum(corners)) / 16.0
+}
+
+/// A pass of smoothing over heights by rows; beyond the edges the edge, or with `wraps` the other edge.
+pub fn smoothed(heights: &[f64], columns: usize, rows: usize, wraps: bool) -> Vec<f64> {
+    let beside = |n: usize, by: i64, size: usize| {
+        let at = n as i64 + by;
+        if wraps {
+            at.rem_euclid(size as i64) as usize
+        } else {
+            at.clamp(0, size as i64 - 1) as usize
+        }
+    };
+    (0..rows * columns)
+        .map(|k| {
+            let at = |dx: i64, dz: i64| {
+                heights[beside(k / columns, dz, rows) * columns + beside(k % columns, dx, columns)]
+            };
+            let sides = [at(-1, 0), at(1, 0), at(0, -1), at(0, 1)];
+            let corners = [at(-1, -1), at(1, 1), at(-1, 1), at(1, -1)];
+            smoothed_height(at(0, 0), sides, corners)
+        })
+        .collect()
+}
+
+/// Share by which ground is dug at a column and row and a height (m): less where spots or layers are hard.
+pub fn softness(x: f64, z: f64, height: f64, hardness: f64, wavelength: f64, layer: f64) -> f64 {
+    let hard = if layer > 0.0 {
+        0.5 + 0.5 * (std::f64::consts::TAU * (height / layer)).cos()
+    } else if wavelength > 0.0 {
+        let at = [x, z].map(|v| v / wavelength.max(1.0));
+        let cell = at.map(f64::floor);
+        let frac = [at[0] - cell[0], at[1] - cell[1]];
+        0.5 + 0.5 * value_noise_2d(cell.map(|c| c as i32), frac, 7)
+    } else {
+        0.0
+    };
+    1.0 - hardness * hard
+}
+
+/// What comes from the sky and the depth, in metres a second.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Weather {
+    /// Rain everywhere.
+    pub rain: f64,
+    /// Evaporation, of no more than there is.
+    pub evaporation: f64,
+    /// Seepage, of no more than is left.
+    pub seepage: f64,
+    /// Springs: column, row, radius (cells) and depth that wells up in their cells.
+    pub springs: Vec<[f64; 4]>,
+}
+
+impl Weather {
+    /// Depth that falls and wells up in a cell in a second.
+    pub fn fresh(&self, x: i64, z: i64) -> f64 {
+        self.rain + self.sprung(x, z)
+    }
+
+    fn sprung(&self, x: i64, z: i64) -> f64 {
+        self.springs
+            .iter()
+            .filter(|s| (x as f64 - s[0]).powi(2) + (z as f64 - s[1]).powi(2) <= s[2] * s[2])
+            .map(|s| s[3])
+            .sum()
+    }
+
+    /// Does to a cell's water what a step's weather does, and notes it.
+    fn falls(&self, water: &mut f64, x: i64, z: i64, step: f64, went: &mut Went) {
+        let gained = self.fresh(x, z) * step;
+        let there = water.max(0.0);
+        let evaporated = there.min(self.evaporation * step);
+        let seeped = (there - evaporated).min(self.seepage * step);
+        *water += gained - evaporated - seeped;
+        went.gained += gained;
+        went.evaporated += evaporated;
+        went.seeped += seeped;
+    }
+}
+
+/// What came and went in a step, summed over cells (m).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Went {
+    /// Rained and sprung up.
+    pub gained: f64,
+    /// Evaporated.
+    pub evaporated: f64,
+    /// Seeped away.
+    pub seeped: f64,
+    /// Run off over open edges.
+    pub run_off: f64,
+    /// Load run off with it.
+    pub load_off: f64,
 }
 
 /// Level at which the water of a cell is shown, from levels and depths of its eight neighbours, those at the sides first.
@@ -155,8 +267,8 @@ pub struct Cells {
     pub speeds: Vec<[f64; 4]>,
 }
 
-/// Coefficients of erosion: capacity, deepest, dig, lay, height difference from which ground slides, share that slides.
-pub type Digging = [f64; 6];
+/// Coefficients of erosion: capacity, deepest, dig, lay, height difference from which ground slides, share that slides, hardness, wavelength of hard spots (cells), thickness of layers (m).
+pub type Digging = [f64; 9];
 
 const SIDES: [(i64, i64); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 
@@ -174,7 +286,7 @@ impl Cells {
         }
     }
 
-    /// One step of the source's scheme; what ran off over the edges (m).
+    /// One step of the source's scheme.
     pub fn source_step(
         &mut self,
         edge: Edge,
@@ -182,7 +294,8 @@ impl Cells {
         damping: f64,
         momentum: bool,
         digging: Option<Digging>,
-    ) -> f64 {
+        weather: &Weather,
+    ) -> Went {
         let count = self.columns * self.rows;
         let level: Vec<f64> = self
             .ground
@@ -190,7 +303,7 @@ impl Cells {
             .zip(&self.water)
             .map(|(g, w)| g + w)
             .collect();
-        let mut run_off = 0.0;
+        let mut went = Went::default();
         let mut speeds = self.speeds.clone();
         for (k, v) in speeds.iter_mut().enumerate() {
             for (side, v) in v.iter_mut().enumerate() {
@@ -213,13 +326,28 @@ impl Cells {
             v.iter_mut().for_each(|v| *v *= share);
         }
         let mut concentration = vec![0.0; count];
-        if let Some([strength, deepest, dig, lay, steepest, rate]) = digging {
+        if let Some(
+            [
+                strength,
+                deepest,
+                dig,
+                lay,
+                steepest,
+                rate,
+                hardness,
+                wavelength,
+                layer,
+            ],
+        ) = digging
+        {
             let before = self.ground.clone();
             for k in 0..count {
                 let v = speeds[k];
                 let speed = (v[0] - v[2]).hypot(v[1] - v[3]);
                 let most = capacity(speed, self.water[k], strength, deepest);
-                let dug = dissolved(self.load[k], most, 1.0, self.water[k], dig, lay);
+                let (x, z) = ((k % self.columns) as f64, (k / self.columns) as f64);
+                let soft = softness(x, z, before[k], hardness, wavelength, layer);
+                let dug = dissolved(self.load[k], most, soft, self.water[k], dig, lay);
                 self.load[k] += dug;
                 concentration[k] = self.load[k].max(0.0) / self.water[k].max(1e-12) * 0.999999;
                 self.ground[k] -= dug;
@@ -252,13 +380,16 @@ impl Cells {
                     speeds[k][side]
                 };
                 if self.beside(k, side, edge).is_none() {
-                    run_off += speeds[k][side] * step;
+                    went.run_off += speeds[k][side] * step;
+                    went.load_off += concentration[k] * speeds[k][side] * step;
                 }
             }
             self.water[k] = water[k] + arriving - out;
             self.load[k] = load[k] + brought - concentration[k] * out;
+            let (x, z) = ((k % self.columns) as i64, (k / self.columns) as i64);
+            weather.falls(&mut self.water[k], x, z, step, &mut went);
         }
-        run_off
+        went
     }
 }
 
@@ -280,7 +411,7 @@ pub struct Shallow {
 }
 
 impl Shallow {
-    /// One step: gravity, friction, spacing (m), step (s). What ran off (m).
+    /// One step: gravity, friction, spacing (m), step (s).
     pub fn step(
         &mut self,
         edge: Edge,
@@ -288,7 +419,8 @@ impl Shallow {
         friction: f64,
         spacing: f64,
         step: f64,
-    ) -> f64 {
+        weather: &Weather,
+    ) -> Went {
         let (columns, rows) = (self.columns as i64, self.rows as i64);
         let index = |x: i64, z: i64| -> Option<usize> {
             let there = (0..columns).contains(&x) && (0..rows).contains(&z);
@@ -351,7 +483,10 @@ impl Shallow {
                 let share = scale / depth;
                 let all = arriving.iter().map(|(q, _)| q).sum::<f64>() * share;
                 let gain: f64 = arriving.iter().map(|(q, v)| q * (v - u)).sum();
-                let mut next = u + gain * share / all.max(1.0);
+                // What falls and wells up on both sides joins at rest.
+                let (far_x, far_z) = (far as i64 % columns, far as i64 / columns);
+                let fresh = 0.5 * (weather.fresh(x, z) + weather.fresh(far_x, far_z));
+                let mut next = (u + gain * share / all.max(1.0)) * (depth / (depth + fresh * step));
                 let drop = level_drop(
                     old.ground[k] + near_h,
                     old.ground[far] + far_h,
@@ -381,7 +516,7 @@ impl Shallow {
                 });
             }
         }
-        let mut run_off = 0.0;
+        let mut went = Went::default();
         for (k, &(x, z)) in places.iter().enumerate() {
             let q = |n: Option<usize>, axis: usize| n.map_or(0.0, |n| self.discharges[n][axis]);
             let mut more = q(index(x - 1, z), 0) - self.discharges[k][0]
@@ -394,10 +529,11 @@ impl Shallow {
                     .filter(|(dx, dz)| index(x + dx, z + dz).is_none())
                     .count() as f64;
                 more -= fall * ends;
-                run_off += fall * ends * scale;
+                went.run_off += fall * ends * scale;
             }
             self.water[k] = old.water[k] + more * scale;
+            weather.falls(&mut self.water[k], x, z, step, &mut went);
         }
-        run_off
+        went
     }
 }

@@ -8,6 +8,8 @@ use veduta::terrain::{HeightField, HeightMap, Kind, MapTexels};
 
 use crate::common::{Random, gpu};
 use crate::ground::{edited, flat, hilly, made, run, steps};
+use veduta::ground::Erosion;
+use veduta::reference::ground as reference;
 
 fn levels(state: &GroundState, z: usize) -> Vec<f64> {
     (0..state.columns)
@@ -455,4 +457,302 @@ fn ground_springs_come_and_go() {
         let scene = GroundScene::named(name).unwrap();
         scene.camera.unwrap().check().unwrap();
     }
+}
+
+/// The least and greatest height are the device's: of digging, laying down, slides and edits, as of the answer that was taken; never narrower than the ground, nor wider than what it had by more than
+/// rounding.
+#[test]
+fn ground_range_is_the_devices() {
+    let extremes = |state: &GroundState| {
+        (0..state.columns * state.rows)
+            .map(|k| state.ground(k % state.columns, k / state.columns))
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], h| {
+                [a.min(h), b.max(h)]
+            })
+    };
+    let looked = |ground: &mut Ground| {
+        let mut encoder = gpu().device.create_command_encoder(&Default::default());
+        let mut query = ground.query_range(&gpu().device, &mut encoder);
+        gpu().queue.submit([encoder.finish()]);
+        while query.take(&gpu().device, ground).unwrap().is_none() {}
+    };
+    for altitude in [0.0, 3000.0] {
+        // A bowl whose bottom a spring digs, and a pillar that slides.
+        let mut begin = flat(75, 50, |x, z| {
+            altitude + 0.02 * ((x - 30.0).powi(2) + (z - 25.0).powi(2)).sqrt() + 0.05 * x
+        });
+        for z in 20..24 {
+            for x in 60..64 {
+                begin.cell_mut(x, z)[0] += 20.0;
+            }
+        }
+        let options = GroundOptions {
+            rain: 1e-3,
+            erosion: Some(Erosion {
+                capacity: 2.0,
+                dig: 0.5,
+                lay: 0.5,
+                ..Default::default()
+            }),
+            ..Default::default()
+        };
+        let mut ground = made(&options, &begin);
+        let first = ground.range();
+        let mut had = extremes(&begin);
+        let check = |ground: &Ground, had: [f64; 2]| {
+            let [a, b] = ground.range().map(f64::from);
+            let slack = 2e-6 * (altitude + 30.0);
+            assert!(
+                a <= had[0] && b >= had[1] && a >= had[0] - slack && b <= had[1] + slack,
+                "{altitude}: {a} {b}, had {had:?}"
+            );
+        };
+        check(&ground, had);
+        for k in 0..60 {
+            let before = ground.range();
+            steps(&mut ground, 1);
+            // Until an answer is taken it is what it was.
+            assert_eq!(ground.range(), before);
+            looked(&mut ground);
+            let now = extremes(&ground.state(gpu()).unwrap());
+            had = [had[0].min(now[0]), had[1].max(now[1])];
+            check(&ground, had);
+            if k == 30 {
+                let edit = GroundEdit {
+                    tool: Tool::Raise,
+                    x: 5.0,
+                    z: 5.0,
+                    radius: Some(4.0),
+                    strength: 30.0,
+                    seed: 0,
+                };
+                edited(&mut ground, &edit);
+                // At once as high as it could be, then as high as it is.
+                assert!(f64::from(ground.range()[1]) >= had[1] + 29.9);
+                looked(&mut ground);
+                let now = extremes(&ground.state(gpu()).unwrap());
+                had = [had[0].min(now[0]), had[1].max(now[1])];
+                check(&ground, had);
+                assert!(had[1] < altitude + 36.0, "{had:?}");
+            }
+        }
+        assert!(
+            had[0] < f64::from(first[0]) - 1e-3,
+            "nothing was dug: {had:?} {first:?}"
+        );
+        let report = ground.report(gpu()).unwrap();
+        let range = ground.range().map(f64::from);
+        assert!((report.heights[0] - range[0]).abs() < 1e-3);
+        assert!((report.heights[1] - range[1]).abs() < 1e-3);
+        // An answer about an earlier state says nothing of the one that is set now.
+        let mut encoder = gpu().device.create_command_encoder(&Default::default());
+        let mut late = ground.query_range(&gpu().device, &mut encoder);
+        gpu().queue.submit([encoder.finish()]);
+        ground.set_state(&gpu().queue, &begin).unwrap();
+        while late.take(&gpu().device, &mut ground).unwrap().is_none() {}
+        assert_eq!(ground.range(), first);
+    }
+}
+
+/// Shape and smoothing on the device against the processor's: all shapes, boundaries, sizes; over a field too.
+#[test]
+fn ground_shapes_meet_their_reference() {
+    let mut worst = 0.0_f64;
+    let shapes = [
+        Shape::Even,
+        Shape::Hill,
+        Shape::Lake,
+        Shape::Valley,
+        Shape::Ridge,
+        Shape::Slope,
+        Shape::Bed,
+    ];
+    for ([columns, rows], smooth) in [
+        ([16, 16], 3),
+        ([83, 70], 1),
+        ([64, 200], 0),
+        ([1000, 17], 40),
+        ([33, 128], 7),
+    ] {
+        for boundary in [Boundary::Open, Boundary::Closed, Boundary::Periodic] {
+            for shape in shapes {
+                let mut scene = GroundScene {
+                    columns,
+                    rows,
+                    field: Some(HeightField {
+                        wavelength: 40.0,
+                        amplitude: 20.0,
+                        octaves: 5,
+                        seed: 9,
+                        ..Default::default()
+                    }),
+                    ..Default::default()
+                };
+                scene.options.boundary = boundary;
+                let heights = |scene: &GroundScene| -> Vec<f64> {
+                    let state = scene.begin(gpu(), veduta::programs()).unwrap();
+                    state
+                        .cells
+                        .chunks_exact(CHANNELS)
+                        .map(|c| f64::from(c[0]))
+                        .collect()
+                };
+                let field = heights(&scene);
+                (scene.shape, scene.relief, scene.altitude) = (shape, 100.0, 700.0);
+                scene.smooth = smooth;
+                let found = heights(&scene);
+                let (c, r) = (columns as usize, rows as usize);
+                let mut wanted: Vec<f64> = field
+                    .iter()
+                    .enumerate()
+                    .map(|(k, h)| {
+                        let x = ((k % c) as f64 + 0.5) / f64::from(columns);
+                        let z = ((k / c) as f64 + 0.5) / f64::from(rows);
+                        h + 700.0 + 100.0 * shape.share(x, z)
+                    })
+                    .collect();
+                for _ in 0..smooth {
+                    wanted = reference::smoothed(&wanted, c, r, boundary == Boundary::Periodic);
+                }
+                for (k, (is, exact)) in found.iter().zip(&wanted).enumerate() {
+                    worst = worst.max((is - exact).abs());
+                    assert!(
+                        (is - exact).abs() < 3e-4,
+                        "{columns}x{rows} {boundary:?} {shape:?} {smooth} cell {k}: {is} {exact}"
+                    );
+                }
+            }
+        }
+    }
+    println!("at most {worst:.1e} m apart");
+    // Shares as the reference's parts say.
+    for k in 0..=20 {
+        let (x, z) = (f64::from(k) / 20.0, f64::from(k * 7 % 21) / 20.0);
+        assert!((Shape::Bed.share(x, z) - reference::bed_share(x, z)).abs() < 1e-12);
+        assert!((Shape::Ridge.share(x, z) - reference::bump(2.0 * x - 1.0)).abs() < 1e-12);
+    }
+}
+
+/// Queries of a periodic ground go on at the other edge; of others they end at the edge.
+#[test]
+fn ground_queries_wrap_where_the_ground_does() {
+    let (columns, rows) = (45, 38);
+    let turn = std::f64::consts::TAU;
+    let begin = flat(columns, rows, |x, z| {
+        3.0 * (turn * x / 45.0).sin() + 2.0 * (turn * z / 38.0).cos()
+    });
+    let ask = |boundary: Boundary, places: &[[f32; 2]]| {
+        let options = GroundOptions {
+            boundary,
+            ..Default::default()
+        };
+        let mut ground = made(&options, &begin);
+        let mut encoder = gpu().device.create_command_encoder(&Default::default());
+        let mut query = ground
+            .query(&gpu().device, &gpu().queue, &mut encoder, places)
+            .unwrap();
+        gpu().queue.submit([encoder.finish()]);
+        loop {
+            if let Some(found) = query.take(&gpu().device, &mut ground).unwrap() {
+                return found;
+            }
+        }
+    };
+    let mut random = Random(14);
+    let inside: Vec<[f32; 2]> = (0..200)
+        .map(|_| [random.between(0.0, 45.0), random.between(0.0, 38.0)])
+        .collect();
+    let shifted: Vec<[f32; 2]> = inside.iter().map(|[x, z]| [x - 90.0, z + 38.0]).collect();
+    let (one, two) = (
+        ask(Boundary::Periodic, &inside),
+        ask(Boundary::Periodic, &shifted),
+    );
+    for (k, (a, b)) in one.iter().zip(&two).enumerate() {
+        assert!(
+            (a.height - b.height).abs() < 1e-4,
+            "{:?}: {a:?} {b:?}",
+            inside[k]
+        );
+        for n in 0..3 {
+            assert!((a.normal[n] - b.normal[n]).abs() < 1e-4, "{a:?} {b:?}");
+        }
+    }
+    // Halfway from the last cell to the first.
+    let middle = ask(Boundary::Periodic, &[[44.5, 10.0]])[0].height;
+    let wanted = 0.5 * (begin.ground(44, 10) + begin.ground(0, 10));
+    assert!(
+        (f64::from(middle) - wanted).abs() < 1e-5,
+        "{middle} {wanted}"
+    );
+    for boundary in [Boundary::Open, Boundary::Closed] {
+        let [a, b] = [44.5, 1e4].map(|x| ask(boundary, &[[x, 10.0]])[0].height);
+        assert_eq!(a, b);
+        assert!((f64::from(a) - begin.ground(44, 10)).abs() < 1e-5);
+    }
+}
+
+/// Every key of `--set` refuses what it may not be, by name.
+#[test]
+fn ground_keys_refuse_what_is_out_of_range() {
+    let bad = [
+        ("COLUMNS", "15"),
+        ("ROWS", "4097"),
+        ("SIZE", "8"),
+        ("SHAPE", "Cone"),
+        ("RELIEF", "2e4"),
+        ("ALTITUDE", "-2e4"),
+        ("SMOOTH", "1001"),
+        ("SEED", "-1"),
+        ("WATER_LEVEL", "3e4"),
+        ("WATER_SHARE", "1.5"),
+        ("DEPTH", "-1"),
+        ("SCHEME", "Wet"),
+        ("BOUNDARY", "Far"),
+        ("SPACING", "0"),
+        ("STEP", "0.6"),
+        ("DAMPING", "1.1"),
+        ("MOMENTUM", "maybe"),
+        ("RAIN", "-1"),
+        ("EVAPORATION", "4e6"),
+        ("SEEPAGE", "nan"),
+        ("MEAN_WEIGHT", "0"),
+        ("GRAVITY", "0"),
+        ("COURANT", "0.6"),
+        ("FRICTION", "2"),
+        ("LONGEST_STEP", "0"),
+        ("EROSION", "perhaps"),
+        ("CAPACITY", "11"),
+        ("DEEPEST", "-1"),
+        ("DIG", "2"),
+        ("LAY", "-0.1"),
+        ("SLOPE_LIMIT", "-1"),
+        ("SLIDE", "0.3"),
+        ("HARDNESS", "2"),
+        ("HARD_WAVELENGTH", "5000"),
+        ("LAYER", "-1"),
+        ("SPRING", "1,2,3,-4"),
+    ];
+    assert_eq!(bad.map(|(key, _)| key), GroundScene::keys());
+    for (key, value) in bad {
+        let mut scene = GroundScene::named("erosion").unwrap();
+        let fault = scene
+            .set(key, value)
+            .and_then(|()| scene.check())
+            .expect_err(key)
+            .to_string();
+        // By the name of the key or of its field.
+        let named = match key {
+            "SIZE" => "columns".to_owned(),
+            "SPRING" => "springs.rate".to_owned(),
+            _ => key.to_lowercase(),
+        };
+        assert!(fault.to_lowercase().contains(&named), "{key}: {fault}");
+    }
+    // A seed of nothing.
+    let mut scene = GroundScene::named("dam_break").unwrap();
+    let fault = scene.set("SEED", "3").unwrap_err().to_string();
+    assert!(fault.contains("SEED") && fault.contains("field"), "{fault}");
+    let mut scene = GroundScene::named("rain").unwrap();
+    scene.set("SEED", "3").unwrap();
+    assert_eq!(scene.field.unwrap().seed, 3);
 }

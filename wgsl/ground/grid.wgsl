@@ -55,39 +55,48 @@ struct Strip {
     group: i32,
     first: i32,
     end: i32,
-    /// Where its column starts, in vectors after a row's start.
-    column: i32,
-    /// Cells beside its own, over the edge if it wraps, in floats after a row's start.
+    /// Where its first row is in a plane, and from there the next row, in vectors.
+    at: i32,
+    pitch: i32,
+    /// Columns beside its own, over the edge if it wraps.
+    left_column: i32,
+    right_column: i32,
+    /// Where they are in the first row, and from there in the next row, in floats.
     left: i32,
+    left_pitch: i32,
     right: i32,
+    right_pitch: i32,
 }
 
-/// Vectors a plane. A plane holds tile after tile, each with 32 rows of 8 vectors side by side in memory: rows that are read one after the other follow each other there.
+/// Vectors a plane. A plane holds tile after tile, each with its rows one after the other: rows that are read one after the other follow each other there. A tile has 32 rows of 8 vectors; the
+/// last of a row and of a column are as narrow as the grid.
 ///
 /// internal
 fn plane_of(now: GroundStep) -> i32 {
-    return 256 * now.tiles;
+    return now.groups * now.rows;
 }
 
-/// Where a row starts in a plane, in vectors.
+/// Vectors from a row to the next in the tile of a group.
 ///
 /// internal
-fn row_start(now: GroundStep, z: i32) -> i32 {
-    return (z >> 5u) * (256 * now.tiles_x) + 8 * (z & 31);
+fn pitch_of(now: GroundStep, group: i32) -> i32 {
+    return min(8, now.groups - (group & -8));
 }
 
-/// Where a group of four columns is after a row's start, in vectors.
+/// Where a group of four columns of a row is in a plane, in vectors.
 ///
 /// internal
-fn column_start(group: i32) -> i32 {
-    return (group >> 3u) * 256 + (group & 7);
+fn place_of(now: GroundStep, group: i32, z: i32) -> i32 {
+    let above = z & -32;
+    let before = group & -8;
+    return above * now.groups + before * min(32, now.rows - above) + (z - above) * min(8, now.groups - before) + (group - before);
 }
 
-/// Where a column is after a row's start, in floats.
+/// Where a cell is in a plane, in floats.
 ///
 /// internal
-fn cell_start(x: i32) -> i32 {
-    return 4 * column_start(x >> 2u) + (x & 3);
+fn cell_place(now: GroundStep, x: i32, z: i32) -> i32 {
+    return 4 * place_of(now, x >> 2u, z) + (x & 3);
 }
 
 /// The strip of a lane of a tile.
@@ -100,7 +109,8 @@ fn strip_of(now: GroundStep, tile: i32, lane: i32) -> Strip {
     let x = 4 * group;
     let left = select(x - 1, select(0, now.columns - 1, wraps), x == 0);
     let right = select(x + 4, select(now.columns - 1, 0, wraps), x + 4 >= now.columns);
-    return Strip(group, first, min(first + 32, now.rows), column_start(group), cell_start(left), cell_start(right));
+    return Strip(group, first, min(first + 32, now.rows), place_of(now, group, first), pitch_of(now, group), left, right, cell_place(now, left, first),
+        4 * pitch_of(now, left >> 2u), cell_place(now, right, first), 4 * pitch_of(now, right >> 2u));
 }
 
 /// A row, or what lies beyond the edge: the other edge, or the row itself.
@@ -115,6 +125,16 @@ fn row_at(now: GroundStep, z: i32) -> i32 {
         return select(now.rows - 1, 0, wraps);
     }
     return z;
+}
+
+/// Where the row after a strip's row `z`, which is at `at`, is in a plane, in vectors; after the last, what lies beyond the edge.
+///
+/// internal
+fn row_after(now: GroundStep, place: Strip, at: i32, z: i32) -> i32 {
+    if z + 1 < place.end {
+        return at + place.pitch;
+    }
+    return place_of(now, place.group, row_at(now, z + 1));
 }
 
 /// The columns of a group.

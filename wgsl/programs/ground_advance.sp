@@ -4,9 +4,12 @@ Second half of a step of shallow water: discharges through the faces, each found
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, strip_of, row_start, plane_of, row_at, columns_of, from_left, from_right, sourced, weather, running_mean}
+#import veduta::ground::grid::{GroundStep, strip_of, place_of, row_after, plane_of, row_at, columns_of, from_left, from_right, sourced, weather, running_mean}
 #import veduta::ground::shallow::{sill_depth, discharge}
 #import veduta::ground::exact::{add_exactly, opaque}
+
+// Whether there may be rain or springs.
+override GROUND_FRESH: i32 = 1;
 
 @group(0) @binding(0) var<uniform> now: GroundStep;
 @group(0) @binding(1) var<uniform> sources: mat4x4<f32>;
@@ -59,18 +62,18 @@ fn advance(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
     var run_off = vec4<f32>(0.0);
     var stirs = vec4<f32>(0.0);
     var top = vec4<f32>(0.0);
-    let first_at = row_start(now, place.first) + place.column;
-    let low_at = row_start(now, row_at(now, place.first - 1)) + place.column;
+    let first_at = place.at;
+    let low_at = place_of(now, place.group, row_at(now, place.first - 1));
     var here_water = water[first_at];
     var here_ground = ground[first_at];
     let low_wall = place.first == 0 && ends;
     var low_w = select(faces_z[low_at], vec4<f32>(0.0), vec4<bool>(low_wall));
     var low_qz = through(low_w, ground[low_at], water[low_at], here_ground, here_water);
     for (var z = place.first; z < place.end; z++) {
-        let at = row_start(now, z) + place.column;
-        let next = row_start(now, row_at(now, z + 1)) + place.column;
-        let left_at = 4 * row_start(now, z) + place.left;
-        let right_at = 4 * row_start(now, z) + place.right;
+        let at = place.at + (z - place.first) * place.pitch;
+        let next = row_after(now, place, at, z);
+        let left_at = place.left + (z - place.first) * place.left_pitch;
+        let right_at = place.right + (z - place.first) * place.right_pitch;
         let high_water = water[next];
         let high_ground = ground[next];
         let u = faces_x[at];
@@ -88,7 +91,11 @@ fn advance(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
         let off = fall * ((at_left + at_right) + (select(0.0, 1.0, z == 0 && ends) + select(0.0, 1.0, z == now.rows - 1 && ends)));
         let more = ((qx_left - qx) + (low_qz - qz)) * scale - off * scale;
         let moved = add_exactly(here_water, water[plane + at], more, now.none);
-        let change = weather(now, sourced(sources, now.sources, columns, z), moved.value, inside, step);
+        var spring = vec4<f32>(0.0);
+        if GROUND_FRESH != 0 {
+            spring = sourced(sources, now.sources, columns, z);
+        }
+        let change = weather(now, spring, moved.value, inside, step);
         let after = add_exactly(moved.value, moved.lost, (change.gained - change.evaporated) - change.seeped, now.none);
         water_after[at] = after.value;
         water_after[plane + at] = after.lost;

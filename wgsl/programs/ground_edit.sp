@@ -1,27 +1,14 @@
-Changes of the ground and its water under a cursor, or everywhere. With GROUND_LEVEL the ground over the reference level, from base and change, of all cells.
+Changes of the ground and its water under a cursor, or everywhere.
 
 #PROGRAM{ ground_edit }#
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, row_at, row_start, column_start, cell_start, plane_of, columns_of, from_left, from_right}
+#import veduta::ground::grid::{GroundStep, row_at, place_of, cell_place, plane_of, columns_of, from_left, from_right}
 #import veduta::ground::exact::{add_exactly}
 #import veduta::noise::value::{value_noise_2d}
 
 @group(0) @binding(0) var<uniform> now: GroundStep;
-#ifdef GROUND_LEVEL
-@group(1) @binding(0) var<storage, read> change: array<vec4<f32>>;
-@group(2) @binding(0) var<storage, read_write> ground: array<vec4<f32>>;
-
-@compute @workgroup_size(64)
-fn edit(@builtin(global_invocation_id) id: vec3<u32>) {
-    if i32(id.x) >= now.groups {
-        return;
-    }
-    let at = row_start(now, i32(id.y)) + column_start(i32(id.x));
-    ground[at] = (ground[plane_of(now) + at] - now.reference) + change[at];
-}
-#else
 struct Edit {
     // Cursor in cells and its radius; below 0: everywhere.
     x: f32,
@@ -45,10 +32,9 @@ struct Edit {
 
 fn row(z: i32, group: i32, left: i32, right: i32, last: vec4<bool>) -> vec4<f32> {
     let at = row_at(now, z);
-    let start = row_start(now, at);
-    let here = ground[start + column_start(group)];
-    let l = 4 * start + cell_start(left);
-    let r = 4 * start + cell_start(right);
+    let here = ground[place_of(now, group, at)];
+    let l = cell_place(now, left, at);
+    let r = cell_place(now, right, at);
     // The weights 1, 2, 1 along x.
     return (2.0 * here + (from_left(here, ground[l >> 2u][l & 3]) + from_right(here, ground[r >> 2u][r & 3], last))) * 0.25;
 }
@@ -61,7 +47,7 @@ fn edit(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let plane = plane_of(now);
-    let at = row_start(now, z) + column_start(group);
+    let at = place_of(now, group, z);
     let columns = columns_of(group);
     let inside = select(vec4<f32>(0.0), vec4<f32>(1.0), columns < vec4<i32>(now.columns));
     let dx = vec4<f32>(columns) - tool.x;
@@ -111,6 +97,5 @@ fn edit(@builtin(global_invocation_id) id: vec3<u32>) {
         change[plane + at] = pair.lost;
     }
 }
-#endif
     }#
 }#

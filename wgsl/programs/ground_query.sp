@@ -4,7 +4,7 @@ Height, depth, velocity and normal of the ground at given places, between cells 
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, row_start, cell_start, plane_of}
+#import veduta::ground::grid::{GroundStep, cell_place, plane_of}
 
 struct Found {
     height: f32,
@@ -22,8 +22,12 @@ struct Found {
 @group(1) @binding(4) var<storage, read> places: array<vec2<f32>>;
 @group(2) @binding(0) var<storage, read_write> results: array<Found>;
 
+// Beyond the edges the other edge where they are periodic, else the edge.
 fn cell(x: i32, z: i32) -> i32 {
-    return 4 * row_start(now, clamp(z, 0, now.rows - 1)) + cell_start(clamp(x, 0, now.columns - 1));
+    let size = vec2<i32>(now.columns, now.rows);
+    let at = vec2<i32>(x, z);
+    let p = select(clamp(at, vec2<i32>(0), size - 1), (at + size) % size, vec2<bool>(now.boundary == 2));
+    return cell_place(now, p.x, p.y);
 }
 
 fn height(x: i32, z: i32) -> f32 {
@@ -49,7 +53,11 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= arrayLength(&places) {
         return;
     }
-    let p = clamp(places[id.x], vec2<f32>(0.0), vec2<f32>(f32(now.columns - 1), f32(now.rows - 1)));
+    let size = vec2<f32>(f32(now.columns), f32(now.rows));
+    let asked = places[id.x];
+    // A quotient that rounds up may leave the grid by its last place.
+    let wrapped = clamp(asked - size * floor(asked / size), vec2<f32>(0.0), size);
+    let p = select(clamp(asked, vec2<f32>(0.0), size - 1.0), select(wrapped, vec2<f32>(0.0), wrapped >= size), vec2<bool>(now.boundary == 2));
     let corner = vec2<i32>(floor(p));
     let f = p - floor(p);
     var found = Found(0.0, 0.0, vec2<f32>(0.0), vec3<f32>(0.0), 0.0);

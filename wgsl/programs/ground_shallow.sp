@@ -4,10 +4,13 @@ First half of a step of shallow water: speeds on the faces towards +x and +z, by
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, strip_of, row_start, plane_of, row_at, columns_of, from_left, from_right, sourced}
+#import veduta::ground::grid::{GroundStep, strip_of, place_of, cell_place, row_after, plane_of, row_at, columns_of, from_left, from_right, sourced}
 #import veduta::ground::exact::{opaque}
 #import veduta::ground::flow::{level_drop}
 #import veduta::ground::shallow::{sill_depth, rubbed_speed}
+
+// Whether there may be rain or springs.
+override GROUND_FRESH: i32 = 1;
 
 @group(0) @binding(0) var<uniform> now: GroundStep;
 @group(0) @binding(1) var<uniform> sources: mat4x4<f32>;
@@ -66,7 +69,10 @@ fn next_speed(flow: Flow, ground_near: vec4<f32>, near: vec4<f32>, ground_far: v
     let along = opaque(from_before * (flow.before - flow.speed), now.none) + opaque(from_behind * (flow.behind - flow.speed), now.none);
     let across = opaque(from_below * (flow.below - flow.speed), now.none) + opaque(from_above * (flow.above - flow.speed), now.none);
     let gain = along + across;
-    let carried = (flow.speed + gain * (share / max(all, vec4<f32>(1.0)))) * (depth / (depth + flow.fresh * step));
+    var carried = flow.speed + gain * (share / max(all, vec4<f32>(1.0)));
+    if GROUND_FRESH != 0 {
+        carried *= depth / (depth + flow.fresh * step);
+    }
     let drop = level_drop(ground_near + near, ground_far + far, max(near, far));
     // Small depths over high ground: the levels' difference is that of depths less the rise, which rounds less.
     let fine = select((near - far) - rise, none, drop == none);
@@ -98,13 +104,13 @@ fn shallow(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
     let has_right = select(vec4<f32>(1.0), vec4<f32>(0.0), (columns >= vec4<i32>(now.columns - 1)) & vec4<bool>(ends));
     let inside = select(vec4<f32>(0.0), vec4<f32>(1.0), columns < vec4<i32>(now.columns));
     let low_row = row_at(now, place.first - 1);
-    let low_at = row_start(now, low_row) + place.column;
-    let first_at = row_start(now, place.first) + place.column;
+    let low_at = place_of(now, place.group, low_row);
+    let first_at = place.at;
     var has_low = select(1.0, 0.0, place.first == 0 && ends);
     var low_u = old_x[low_at];
     var low_w = old_z[low_at] * has_low;
     var low_qz = old_z[plane + low_at] * has_low;
-    let low_end = 4 * row_start(now, low_row) + place.right;
+    let low_end = cell_place(now, place.right_column, low_row);
     var low_qz_end = old_z[plane + (low_end >> 2u)][low_end & 3] * has_low;
     var u = old_x[first_at];
     var w = old_z[first_at];
@@ -112,18 +118,27 @@ fn shallow(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
     var qz = old_z[plane + first_at];
     var here_water = water[first_at];
     var here_ground = ground[first_at];
-    let first_left = 4 * row_start(now, place.first) + place.left;
+    let first_left = place.left;
     var qx_left = has_left * from_left(qx, old_x[plane + (first_left >> 2u)][first_left & 3]);
     var stirs = vec4<f32>(0.0);
-    var spring = sourced(sources, now.sources, columns, place.first);
+    // The cells behind the faces to the right.
+    let right_columns = select(columns + vec4<i32>(1), vec4<i32>(0), last & vec4<bool>(!ends));
+    var spring = vec4<f32>(0.0);
+    if GROUND_FRESH != 0 {
+        spring = sourced(sources, now.sources, columns, place.first);
+    }
     for (var z = place.first; z < place.end; z++) {
-        let right_spring = sourced(sources, now.sources, columns + vec4<i32>(1), z);
-        let high_spring = sourced(sources, now.sources, columns, z + 1);
-        let at = row_start(now, z) + place.column;
         let high_row = row_at(now, z + 1);
-        let next = row_start(now, high_row) + place.column;
-        let left_at = 4 * row_start(now, z) + place.left;
-        let right_at = 4 * row_start(now, z) + place.right;
+        var right_spring = vec4<f32>(0.0);
+        var high_spring = vec4<f32>(0.0);
+        if GROUND_FRESH != 0 {
+            right_spring = sourced(sources, now.sources, right_columns, z);
+            high_spring = sourced(sources, now.sources, columns, high_row);
+        }
+        let at = place.at + (z - place.first) * place.pitch;
+        let next = row_after(now, place, at, z);
+        let left_at = place.left + (z - place.first) * place.left_pitch;
+        let right_at = place.right + (z - place.first) * place.right_pitch;
         let left_group = left_at >> 2u;
         let right_group = right_at >> 2u;
         let left_lane = left_at & 3;
@@ -136,7 +151,7 @@ fn shallow(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
         let high_qz = old_z[plane + next];
         let high_water = water[next];
         let high_ground = ground[next];
-        let high_left = 4 * row_start(now, high_row) + place.left;
+        let high_left = cell_place(now, place.left_column, high_row);
         let high_qx_left = has_left * from_left(high_qx, old_x[plane + (high_left >> 2u)][high_left & 3]);
         let right_water = from_right(here_water, water[right_group][right_lane], last);
         let right_ground = from_right(here_ground, ground[right_group][right_lane], last);

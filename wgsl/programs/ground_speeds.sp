@@ -4,7 +4,7 @@ First half of a step of the source's water: outflow speeds from differences of l
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, strip_of, row_start, plane_of, row_at, columns_of, from_left, from_right}
+#import veduta::ground::grid::{GroundStep, strip_of, place_of, row_after, plane_of, row_at, columns_of, from_left, from_right}
 #import veduta::ground::flow::{level_drop, driven_speed, outflow_share}
 #import veduta::ground::exact::{opaque}
 #ifdef GROUND_EROSION
@@ -64,34 +64,33 @@ fn speeds(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id:
     let beyond_right = last & vec4<bool>(now.boundary != 2);
     let open_x = inside * select(vec4<f32>(1.0), vec4<f32>(0.0), beyond_left & vec4<bool>(walls));
     let open_right = inside * select(vec4<f32>(1.0), vec4<f32>(0.0), beyond_right & vec4<bool>(walls));
-    let before_row = row_start(now, row_at(now, place.first - 1)) + place.column;
-    let first_row = row_start(now, place.first) + place.column;
+    let before_row = place_of(now, place.group, row_at(now, place.first - 1));
+    let first_row = place.at;
     var low_ground = ground[before_row];
     var low = low_ground + water[before_row];
     var here_ground = ground[first_row];
     var here_water = water[first_row];
     for (var z = place.first; z < place.end; z++) {
-        let at = row_start(now, z) + place.column;
-        let next = row_start(now, row_at(now, z + 1)) + place.column;
+        let at = place.at + (z - place.first) * place.pitch;
+        let next = row_after(now, place, at, z);
         let high_ground = ground[next];
         let high_water = water[next];
         let here = here_ground + here_water;
         let high = high_ground + high_water;
-        let row = 4 * row_start(now, z);
         let beyond_low = vec4<bool>(z == 0 && now.boundary != 2);
         let beyond_high = vec4<bool>(z == now.rows - 1 && now.boundary != 2);
+        let left_at = place.left + (z - place.first) * place.left_pitch;
+        let right_at = place.right + (z - place.first) * place.right_pitch;
         // Open edges: the same ground without water.
         let open = vec4<bool>(falls);
 #ifdef GROUND_EROSION
-        let left_at = row + place.left;
-        let right_at = row + place.right;
         let left_ground = from_left(here_ground, ground[left_at >> 2u][left_at & 3]);
         let right_ground = from_right(here_ground, ground[right_at >> 2u][right_at & 3], last);
         let left_level = left_ground + from_left(here_water, water[left_at >> 2u][left_at & 3]);
         let right_level = right_ground + from_right(here_water, water[right_at >> 2u][right_at & 3], last);
 #else
-        let left_level = from_left(here, level(row + place.left));
-        let right_level = from_right(here, level(row + place.right), last);
+        let left_level = from_left(here, level(left_at));
+        let right_level = from_right(here, level(right_at), last);
 #endif
         let to_right = level_drop(here, select(right_level, here_ground, beyond_right & open), here_water);
         let to_left = level_drop(here, select(left_level, here_ground, beyond_left & open), here_water);

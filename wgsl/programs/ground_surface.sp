@@ -4,7 +4,7 @@ What the picture of the ground shows of every cell: height, level of the water a
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, row_start, cell_start}
+#import veduta::ground::grid::{GroundStep, cell_place}
 #import veduta::ground::surface::{displayed_level}
 
 struct Shore {
@@ -23,7 +23,7 @@ struct Shore {
 
 // Where a cell is; beyond the edges those of the edge.
 fn index_of(x: i32, z: i32) -> i32 {
-    return 4 * row_start(now, clamp(z, 0, now.rows - 1)) + cell_start(clamp(x, 0, now.columns - 1));
+    return cell_place(now, clamp(x, 0, now.columns - 1), clamp(z, 0, now.rows - 1));
 }
 
 // Level and depth of a cell.

@@ -4,9 +4,12 @@ Second half of a step of the source's water: water moves by the outflow speeds a
 
 #COMPUTE{
     #CODE{
-#import veduta::ground::grid::{GroundStep, strip_of, row_start, plane_of, row_at, columns_of, from_left, from_right, sourced, weather, running_mean}
+#import veduta::ground::grid::{GroundStep, strip_of, place_of, row_after, plane_of, row_at, columns_of, from_left, from_right, sourced, weather, running_mean}
 #import veduta::ground::flow::{mixed_speed}
 #import veduta::ground::exact::{add_exactly, opaque}
+
+// Whether there may be rain or springs.
+override GROUND_FRESH: i32 = 1;
 
 @group(0) @binding(0) var<uniform> now: GroundStep;
 @group(0) @binding(1) var<uniform> sources: mat4x4<f32>;
@@ -54,27 +57,26 @@ fn transport(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) 
     var run_off = vec4<f32>(0.0);
     var load_off = vec4<f32>(0.0);
     var stirs = vec4<f32>(0.0);
-    let low_start = row_at(now, place.first - 1);
-    let at_start = row_start(now, place.first) + place.column;
-    var low_up = old_z[row_start(now, low_start) + place.column];
+    let low_start = place_of(now, place.group, row_at(now, place.first - 1));
+    let at_start = place.at;
+    var low_up = old_z[low_start];
     var up = old_z[at_start];
     var down = old_z[plane + at_start];
 #ifdef GROUND_EROSION
-    var low_load = means[plane + row_start(now, low_start) + place.column];
+    var low_load = means[plane + low_start];
     var here_load = means[plane + at_start];
 #endif
     for (var z = place.first; z < place.end; z++) {
-        let at = row_start(now, z) + place.column;
-        let high_row = row_at(now, z + 1);
-        let next = row_start(now, high_row) + place.column;
+        let at = place.at + (z - place.first) * place.pitch;
+        let next = row_after(now, place, at, z);
         let high_up = old_z[next];
         let high_down = old_z[plane + next];
         let has_low = select(1.0, 0.0, z == 0 && ends);
         let has_high = select(1.0, 0.0, z == now.rows - 1 && ends);
         let right = old_x[at];
         let left = old_x[plane + at];
-        let left_at = 4 * row_start(now, z) + place.left;
-        let right_at = 4 * row_start(now, z) + place.right;
+        let left_at = place.left + (z - place.first) * place.left_pitch;
+        let right_at = place.right + (z - place.first) * place.right_pitch;
         // Speeds that arrive, by the direction that they have.
         let in_right = has_left * from_left(right, old_x[left_at >> 2u][left_at & 3]);
         let in_left = has_right * from_right(left, old_x[plane + (right_at >> 2u)][right_at & 3], last);
@@ -86,7 +88,11 @@ fn transport(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) 
         // Where all that may leave leaves, what stays is known better than the difference says.
         let kept = select(max(before - out, vec4<f32>(0.0)), before * 1e-6, out >= before * 0.999998);
         let moved = add_exactly(before, water[plane + at], arriving - out, now.none);
-        let change = weather(now, sourced(sources, now.sources, columns, z), moved.value, inside, step);
+        var spring = vec4<f32>(0.0);
+        if GROUND_FRESH != 0 {
+            spring = sourced(sources, now.sources, columns, z);
+        }
+        let change = weather(now, spring, moved.value, inside, step);
         let after = add_exactly(moved.value, moved.lost, (change.gained - change.evaporated) - change.seeped, now.none);
         water[at] = after.value;
         water[plane + at] = after.lost;

@@ -1,13 +1,19 @@
 //! What a step of the living ground costs, by scheme, and what sleeping tiles spare.
 
 use serde_json::json;
-use veduta::ground::{Boundary, CHANNELS, Erosion, Ground, GroundOptions, GroundState, Scheme};
-use veduta::wgpu;
+use veduta::glam::Vec3;
+use veduta::ground::{
+    Boundary, CHANNELS, Erosion, Ground, GroundCamera, GroundOptions, GroundPicture,
+    GroundPictureOptions, GroundState, Scheme,
+};
+use veduta::terrain::TerrainLights;
+use veduta::{Targets, View, WorldPos, wgpu};
 
 use super::timing::Middle;
 use super::{Bench, table};
 use crate::cpu::CpuTime;
 use crate::error::CliError;
+use crate::render::{Size, picture};
 
 /// Cells along each axis.
 const SIZE: usize = 1024;
@@ -95,6 +101,78 @@ impl Copy {
     }
 }
 
+/// Pixels of the pictures.
+const PICTURE: Size = Size {
+    width: 256,
+    height: 144,
+};
+
+/// A picture of a ground, by itself, and its frame.
+struct Drawing {
+    picture: GroundPicture,
+    view: View,
+    lights: TerrainLights,
+    /// Of the colour and of the depth.
+    views: [wgpu::TextureView; 2],
+}
+
+impl Drawing {
+    fn new(device: &wgpu::Device, ground: &Ground) -> Result<Drawing, CliError> {
+        let depth = wgpu::TextureFormat::Depth32Float;
+        let targets = Targets {
+            depth_format: Some(depth),
+            ..Default::default()
+        };
+        let camera = GroundCamera::over(ground.size(), 1.0, ground.range());
+        let aspect = f64::from(PICTURE.width) / f64::from(PICTURE.height);
+        let options = GroundPictureOptions::default();
+        Ok(Drawing {
+            picture: GroundPicture::new(device, veduta::programs(), &targets, ground, &options)?,
+            view: camera.view(WorldPos::default(), aspect)?,
+            lights: TerrainLights {
+                sun: Vec3::splat(0.8),
+                sky: Vec3::splat(0.15),
+                bounce: Vec3::splat(0.1),
+            },
+            views: [targets.color_format, depth]
+                .map(|format| picture(device, PICTURE, format).create_view(&Default::default())),
+        })
+    }
+
+    fn prepare(
+        &mut self,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        ground: &Ground,
+    ) -> Result<(), CliError> {
+        let _ = self
+            .picture
+            .prepare(queue, encoder, ground, &self.view, &self.lights)?;
+        Ok(())
+    }
+
+    fn draw(&self, encoder: &mut wgpu::CommandEncoder) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.views[0],
+                depth_slice: None,
+                resolve_target: None,
+                ops: Default::default(),
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.views[1],
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        let _ = self.picture.draw_opaque(&mut pass);
+    }
+}
+
 /// The worlds: a name, options, and the share of the columns that hold moving water.
 fn worlds() -> Vec<(&'static str, GroundOptions, f64)> {
     let source = GroundOptions {
@@ -150,6 +228,8 @@ pub struct Report {
     pub worlds: Vec<(&'static str, Vec<f64>, f64, f64)>,
     /// Processor seconds of each round for what a step reads and writes at least.
     pub copy: Vec<f64>,
+    /// Processor seconds of each round for finding levels and normals, for drawing, and for a frame with one step of the source's scheme.
+    pub drawn: [Vec<f64>; 3],
 }
 
 /// Measures all worlds in turn, `rounds` times.
@@ -194,6 +274,12 @@ pub fn run(
     let copy = Copy::new(&gpu.device);
     time(STEPS, &mut |encoder| copy.record(encoder))?;
     let mut copied = Vec::new();
+    let mut drawn = [const { Vec::new() }; 3];
+    let mut drawing = Drawing::new(&gpu.device, &grounds[0].1)?;
+    time(1, &mut |encoder| {
+        let _ = drawing.prepare(&gpu.queue, encoder, &grounds[0].1);
+        drawing.draw(encoder);
+    })?;
     for _ in 0..rounds {
         for (name, ground, times) in &mut grounds {
             progress(name);
@@ -202,6 +288,23 @@ pub fn run(
             })?);
         }
         copied.push(time(STEPS, &mut |encoder| copy.record(encoder))?);
+        progress("drawing");
+        let (_, ground, _) = &mut grounds[0];
+        let mut fault = Ok(());
+        // As if it had changed.
+        let options = ground.options().clone();
+        ground.set_options(&gpu.queue, &options)?;
+        drawn[0].push(time(1, &mut |encoder| {
+            fault = drawing.prepare(&gpu.queue, encoder, ground);
+        })?);
+        std::mem::replace(&mut fault, Ok(()))?;
+        drawn[1].push(time(1, &mut |encoder| drawing.draw(encoder))?);
+        drawn[2].push(time(1, &mut |encoder| {
+            let _ = ground.step(encoder, 1);
+            fault = drawing.prepare(&gpu.queue, encoder, ground);
+            drawing.draw(encoder);
+        })?);
+        fault?;
     }
     let mut found = Vec::new();
     for (name, ground, times) in grounds {
@@ -217,6 +320,7 @@ pub fn run(
     Ok(Report {
         worlds: found,
         copy: copied,
+        drawn,
     })
 }
 
@@ -266,6 +370,30 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
             ]
         })
         .collect();
+    let mut frames = vec![
+        [
+            "of a frame",
+            "ms",
+            "ns a cell",
+            "million cells a processor second",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
+    ];
+    let names = [
+        "levels and normals, when the ground has changed".to_owned(),
+        format!("drawing at {}x{}", PICTURE.width, PICTURE.height),
+        "one step of the source's scheme, levels, normals and drawing".to_owned(),
+    ];
+    for (name, times) in names.into_iter().zip(&report.drawn) {
+        let middle = Middle::of(times).median;
+        frames.push(vec![
+            name,
+            format!("{:.1}", middle * 1e3),
+            format!("{:.2}", middle / cells * 1e9),
+            format!("{:.1}", cells / middle / 1e6),
+        ]);
+    }
     let heads = [
         "scheme",
         "floats read and written a cell",
@@ -275,11 +403,13 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
     let bounds = [vec![heads.map(str::to_owned).to_vec()], bounds].concat();
     format!(
         "# What a step of the living ground costs\n\nWritten by `{command}`.\n\n{}\nProcessor time of the process at {SIZE} x {SIZE} cells, medians of {} rounds of {STEPS} steps, the worlds in turn.\n\n{}\n\
-         The copy reads every field of the source's scheme once, writes every field that changes once, and computes nothing. What the schemes read and write at its pace:\n\n{}",
+         The copy reads every field of the source's scheme once, writes every field that changes once, and computes nothing. What the schemes read and write at its pace:\n\n{}\n\
+         Drawing, with the water of the source's world: a `GroundPicture` alone, without sky.\n\n{}",
         bench.machine(),
         report.worlds.first().map_or(0, |w| w.1.len()),
         table(&rows),
         table(&bounds),
+        table(&frames),
     )
 }
 
@@ -299,6 +429,9 @@ pub fn to_json(bench: &Bench, report: &Report, command: &str) -> serde_json::Val
             })
         })
         .collect();
+    document["drawn_seconds"] = json!({
+        "prepare": report.drawn[0], "draw": report.drawn[1], "frame_with_a_step": report.drawn[2],
+    });
     document["copy_seconds"] = report.copy.clone().into();
     document
 }

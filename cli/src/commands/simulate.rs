@@ -417,7 +417,7 @@ fn statistics(
         "ground_change_m": last_changed[0] - changed[0], "ground_moved_m": last_changed[1],
         "solid_balance_m": solid,
         "solid_balance_of_moved": if last_changed[1] > 0.0 { solid.abs() / last_changed[1] } else { 0.0 },
-        "ground_min_m": extremes[0], "ground_max_m": extremes[1], "water_min_m": extremes[2], "water_max_m": extremes[3],
+        "ground_ever_m": report.heights, "ground_min_m": extremes[0], "ground_max_m": extremes[1], "water_min_m": extremes[2], "water_max_m": extremes[3],
         "fastest_m_s": fastest, "wet_cells": wet, "active_tiles": report.active_tiles, "tiles": report.tiles, "tile_steps": report.tile_steps,
         "device_bytes": bytes, "bytes_per_cell": bytes as f64 / cells, "cpu_s": cpu / 1e3, "wall_s": wall.as_secs_f64(),
         "cell_steps_per_cpu_s": if cpu > 0.0 { cells * f64::from(report.steps) / (cpu / 1e3) } else { 0.0 },

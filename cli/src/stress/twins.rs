@@ -1890,6 +1890,15 @@ pub fn registry() -> Vec<Entry> {
     );
     same!(
         list,
+        "ground::shape",
+        "ground",
+        ground,
+        bump,
+        bed_share,
+        smoothed_height
+    );
+    same!(
+        list,
         "ground::surface",
         "ground",
         ground,
