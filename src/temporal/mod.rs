@@ -29,6 +29,8 @@ pub struct TemporalOptions {
     pub bound: f32,
     /// Whether histories are read with a cubic through sixteen pixels; else with a line between two, which blurs what moves and costs less.
     pub sharp: bool,
+    /// Whether the host leaves what shows nothing transparent: where the depth is that of nothing and alpha is 0 all around, no frames are joined, and the result is 0.
+    pub has_empty: bool,
 }
 
 impl TemporalOptions {
@@ -40,6 +42,7 @@ impl TemporalOptions {
             frames: 16.0,
             bound: 3.0,
             sharp: true,
+            has_empty: false,
         }
     }
 
@@ -104,6 +107,8 @@ fn fault(name: &str, value: impl ToString, domain: &str) -> Error {
 pub struct Temporal {
     options: TemporalOptions,
     pipeline: wgpu::RenderPipeline,
+    /// For an eye that stands, whose history needs no filter.
+    still: wgpu::RenderPipeline,
     layouts: Vec<wgpu::BindGroupLayout>,
     block: wgpu::Buffer,
     block_group: wgpu::BindGroup,
@@ -165,30 +170,38 @@ impl Temporal {
             let domain = format!("at most {most} pixels, the device's limit");
             return Err(fault("options.size", value, &domain));
         }
-        let ready = programs.get("temporal", &[])?.pipeline(
-            device,
-            &PipelineOptions {
-                targets: &[
-                    Some(wgpu::TextureFormat::Rgba16Float.into()),
-                    Some(wgpu::TextureFormat::R32Uint.into()),
-                    Some(wgpu::TextureFormat::R32Uint.into()),
-                    Some(wgpu::TextureFormat::R32Uint.into()),
-                ],
-                constants: &[
-                    (
-                        "TEMPORAL_BOUNDED",
-                        f64::from(u8::from(options.bound != f32::INFINITY)),
-                    ),
-                    ("TEMPORAL_SHARP", f64::from(u8::from(options.sharp))),
-                ],
-                ..Default::default()
-            },
-        )?;
-        let Pipeline::Render(pipeline) = ready.pipeline else {
-            return Err(Error::MissingStage {
-                program: "temporal".to_owned(),
-            });
+        // Samples that are so far apart that two never lie in a pixel; a cubic is not for those who save.
+        let sparse = !options.sharp
+            && (0..2).all(|k| f64::from(options.size[k]) >= 1.25 * f64::from(options.taken[k]));
+        let flag = |on: bool| f64::from(u8::from(on));
+        let make = |still: bool| {
+            let ready = programs.get("temporal", &[])?.pipeline(
+                device,
+                &PipelineOptions {
+                    targets: &[
+                        Some(wgpu::TextureFormat::Rgba16Float.into()),
+                        Some(wgpu::TextureFormat::R32Uint.into()),
+                        Some(wgpu::TextureFormat::R32Uint.into()),
+                        Some(wgpu::TextureFormat::R32Uint.into()),
+                    ],
+                    constants: &[
+                        ("TEMPORAL_BOUNDED", flag(options.bound != f32::INFINITY)),
+                        ("TEMPORAL_SHARP", flag(options.sharp)),
+                        ("TEMPORAL_STILL", flag(still)),
+                        ("TEMPORAL_SPARSE", flag(sparse)),
+                    ],
+                    ..Default::default()
+                },
+            )?;
+            match ready.pipeline {
+                Pipeline::Render(pipeline) => Ok((pipeline, ready.bind_group_layouts)),
+                Pipeline::Compute(_) => Err(Error::MissingStage {
+                    program: "temporal".to_owned(),
+                }),
+            }
         };
+        let (pipeline, layouts) = make(false)?;
+        let (still, _) = make(true)?;
         let block = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("veduta temporal view"),
             size: ViewBlock::SIZE as u64,
@@ -197,7 +210,7 @@ impl Temporal {
         });
         let block_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("veduta temporal view"),
-            layout: &ready.bind_group_layouts[0],
+            layout: &layouts[0],
             entries: &[wgpu::BindGroupEntry {
                 binding: 0,
                 resource: block.as_entire_binding(),
@@ -208,7 +221,8 @@ impl Temporal {
         Ok(Temporal {
             options: *options,
             pipeline,
-            layouts: ready.bind_group_layouts,
+            still,
+            layouts,
             block,
             block_group,
             nearest: device.create_sampler(&wgpu::SamplerDescriptor {
@@ -327,7 +341,7 @@ impl Temporal {
     pub fn resources(&self) -> Resources {
         let [width, height] = self.options.size.map(u64::from);
         Resources {
-            pipelines: 1,
+            pipelines: 2,
             bind_groups: 1 + 2 * u32::from(self.groups.is_some()),
             bindings: 1 + 12 * u32::from(self.groups.is_some()),
             buffers: 1,
@@ -385,6 +399,10 @@ impl Temporal {
             shift: self.shift().to_array(),
             bound: self.options.bound.min(100.0),
             frame: self.frame,
+            taken: self.options.taken.map(|n| n as f32),
+            size: self.options.size.map(|n| n as f32),
+            has_empty: u32::from(self.options.has_empty),
+            ..Default::default()
         };
         let bytes = block.to_bytes();
         queue.write_buffer(&self.block, 0, &bytes);
@@ -412,10 +430,16 @@ impl Temporal {
                 ],
                 ..Default::default()
             });
-            pass.set_pipeline(&self.pipeline);
+            pass.set_pipeline(if before == Some(clip) {
+                &self.still
+            } else {
+                &self.pipeline
+            });
             pass.set_bind_group(0, &self.block_group, &[]);
             pass.set_bind_group(1, &groups[from], &[]);
-            pass.draw(0..3, 0..1);
+            // Squares of 32 pixels.
+            let [columns, rows] = self.options.size.map(|n| n.div_ceil(32));
+            pass.draw(0..6 * columns * rows, 0..1);
         }
         self.frame = self.frame.wrapping_add(1);
         self.last = Some((eye, clip));

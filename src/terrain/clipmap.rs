@@ -35,7 +35,10 @@ impl Default for ClipmapOptions {
     }
 }
 
-/// By what the windows move (texels).
+/// Texels of a side of the squares of which the greatest heights are kept, as in the program `terrain_bake`.
+const PEAK: i64 = 2;
+
+/// By what the windows move (texels), a multiple of [`PEAK`].
 const BLOCK: i64 = 32;
 
 /// Texels that a window keeps between what it serves and its border: half a move, and some.
@@ -332,6 +335,18 @@ impl Clipmap {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
             ..Default::default()
         });
+        let peaks = texture(
+            "veduta peaks",
+            options.texels / PEAK as u32,
+            options.texels / PEAK as u32,
+            levels as u32,
+            wgpu::TextureFormat::R32Float,
+            wgpu::TextureUsages::STORAGE_BINDING,
+        )
+        .create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        });
         // A sector is about as wide as four texels: narrower ones save rays fewer steps than they cost (measured).
         let count = options.texels / 2;
         let sectors = texture(
@@ -434,7 +449,7 @@ impl Clipmap {
                 device,
                 &sweep_layouts[1],
                 &[
-                    view(&heights),
+                    view(&peaks),
                     view(&places_view),
                     wgpu::BindingResource::Sampler(&wrapping),
                 ],
@@ -454,7 +469,7 @@ impl Clipmap {
             sweep,
             rectangles,
             bake_source: group(device, &bake_layouts[1], &[view(&relief.view)]),
-            bake_target: group(device, &bake_layouts[2], &[view(&heights)]),
+            bake_target: group(device, &bake_layouts[2], &[view(&heights), view(&peaks)]),
             relief,
             sweep_groups,
             views: [heights, sectors, places_view],
@@ -499,6 +514,11 @@ impl Clipmap {
         (self.texels / 2 - BORDER) as f64 * self.spacing * ((self.levels - 1) as f64).exp2()
     }
 
+    /// Spacing of the finest level that serves places farther than `distance` from the eye along an axis (m), or a little more.
+    pub(super) fn coarsest_within(&self, distance: f64) -> f64 {
+        2.0 * distance / (self.texels / 2 - BORDER) as f64
+    }
+
     /// What it keeps on the device.
     pub fn resources(&self) -> Resources {
         let side = self.texels as u64;
@@ -510,15 +530,15 @@ impl Clipmap {
         Resources {
             pipelines: 2 + u32::from(shaded > 0),
             bind_groups: slots + 5 + 3 * shaded as u32,
-            bindings: slots + 7 + 5 * shaded as u32,
+            bindings: slots + 8 + 5 * shaded as u32,
             buffers: slots + 2 + shaded as u32,
             buffer_bytes: (self.rectangles.len() * RectangleBlock::SIZE
                 + ClipBlock::SIZE
                 + SweepBlock::SIZE
                 + shaded * ShadeBlock::SIZE) as u64,
             samplers: 1,
-            textures: 4 + u32::from(shaded > 0),
-            texture_bytes: level * self.levels as u64
+            textures: 5 + u32::from(shaded > 0),
+            texture_bytes: (level + level / (PEAK * PEAK) as u64) * self.levels as u64
                 + shades
                 + sectors
                 + 512
@@ -691,7 +711,7 @@ impl Clipmap {
         pass.set_bind_group(2, &self.bake_target, &[]);
         for (slot, size) in &jobs {
             pass.set_bind_group(0, &self.rectangles[*slot].group, &[]);
-            let [x, z] = size.map(|s| (s as u32).div_ceil(8));
+            let [x, z] = size.map(|s| (s as u32).div_ceil(8 * PEAK as u32));
             pass.dispatch_workgroups(x, z, 1);
             work.dispatches += 1;
         }

@@ -3,16 +3,17 @@
 use glam::Vec3;
 
 use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group, nearest_ground};
+use super::ground::Prepared;
 use super::land::Land;
 use crate::error::Error;
 use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
 use crate::program::{Pipeline, PipelineOptions, ProgramSet};
 use crate::programs::blocks::{Field as FieldBlock, Rock as RockBlock, TerrainView as ViewBlock};
 use crate::settings::{Preset, Settings};
-use crate::view::View;
+use crate::view::{View, WorldPos};
 
-/// Tiles of the picture: 16 across and 12 down.
-const TILES: u32 = 16 * 12;
+/// Columns of the picture.
+const COLUMNS: u32 = 16;
 
 /// Irradiances on the ground, in the picture's own unit. A host that has an atmosphere takes them [from it](TerrainLights::from_sky).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -165,6 +166,58 @@ fn azimuths([middle, right, up]: [Vec3; 3]) -> [f64; 2] {
         return all;
     }
     [middle.z.atan2(middle.x) + first, last - first]
+}
+
+/// The nearest ground that a picture shows, about: its distance along the ground and through the air (m); none where it shows none. Azimuths are those of [`azimuths`], no distance is taken below
+/// that of the nearest ground of all.
+fn nearest_in_view(
+    field: &Prepared<f32>,
+    eye: WorldPos,
+    [middle, right, up]: [Vec3; 3],
+    [first, extent]: [f64; 2],
+    nearest: f64,
+) -> Option<[f64; 2]> {
+    let all = Some([0.0, nearest]);
+    let tangent = |x: f32, y: f32| {
+        let ray = middle + x * right + y * up;
+        f64::from(ray.y) / f64::from(ray.x.hypot(ray.z)).max(1e-6)
+    };
+    // Of the lowest ray, which lies on the border unless the picture shows the nadir.
+    let mut lowest = f64::INFINITY;
+    for i in 0..16 {
+        let along = i as f32 / 8.0 - 1.0;
+        for [x, y] in [[along, -1.0], [1.0, along], [-along, 1.0], [-1.0, -along]] {
+            lowest = lowest.min(tangent(x, y));
+        }
+    }
+    let nadir = glam::Mat3::from_cols(middle, right, up).inverse() * Vec3::NEG_Y;
+    let shows_nadir = nadir.x > 0.0 && nadir.y.abs().max(nadir.z.abs()) <= nadir.x;
+    if shows_nadir || lowest < -2.0 || !nearest.is_finite() {
+        return all;
+    }
+    // Ground between the places that are asked may stand higher.
+    let lowest = lowest - 0.1 * (1.0 + lowest.abs());
+    let place = field.place(eye);
+    let mut found = f64::INFINITY;
+    for i in 0..9 {
+        let (sine, cosine) = (first + extent * f64::from(i) / 8.0).sin_cos();
+        let mut distance = 0.25 * nearest.max(1.0);
+        while distance < found.min(1e5) {
+            let at = [cosine * distance, sine * distance].map(|c| c as f32);
+            let ground = field.ground_from(place, at, (0.1 * distance) as f32);
+            let rise = f64::from(ground.height) - eye.altitude();
+            if rise.is_nan() {
+                return all;
+            }
+            if rise >= lowest * distance {
+                found = distance;
+            }
+            distance *= 1.25;
+        }
+    }
+    // The step before may have been missed.
+    let along = 0.8 * found;
+    found.is_finite().then_some([along, along.max(nearest)])
 }
 
 impl PlaneTerrain {
@@ -357,11 +410,20 @@ impl PlaneTerrain {
         // A level finer than a pixel on the nearest ground would not be used.
         let nearest = nearest_ground(&field, eye);
         let far = self.far.min(self.clipmap.reach());
+        let azimuths = azimuths([middle, right, up]);
+        let shown = nearest_in_view(&field, eye, [middle, right, up], azimuths, nearest);
+        // One that serves no place in view would not be used either. Texels stay small beside the distance to the ground all around, which must not come up to the eye.
+        let pixel = f64::from(pixel_angle);
+        let unused = shown.map_or(far, |[along, distance]| {
+            let served = along * std::f64::consts::FRAC_1_SQRT_2;
+            (0.35 * pixel * distance).max(self.clipmap.coarsest_within(served))
+        });
+        let least = unused.min(0.25 * nearest).max(0.35 * pixel * nearest);
         let gaze = Gaze {
-            least: 0.35 * f64::from(pixel_angle) * nearest,
+            least,
             near: nearest,
             far,
-            azimuths: azimuths([middle, right, up]),
+            azimuths,
             sun: (lights.sun != Vec3::ZERO).then(|| {
                 let to_sun = view.sun.to_light.normalize_or(Vec3::Y).as_dvec3();
                 (to_sun.to_array(), f64::from(view.sun.angular_radius))
@@ -441,10 +503,59 @@ impl PlaneTerrain {
         for (index, group) in (0..).zip(&self.groups) {
             pass.set_bind_group(index, group, &[]);
         }
-        pass.draw(0..TILES * 6, 0..1);
+        pass.draw(0..COLUMNS * 6, 0..1);
         Work {
             draws: 1,
             ..Work::default()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_ground_in_view_is_nearer_than_is_said() {
+        let land = Land::default();
+        let field = land.field.prepare::<f32>().unwrap();
+        let mut away = 0;
+        for k in 0..60 {
+            let turn = f64::from(k) * 0.37;
+            let at = glam::DVec3::new(900.0 * f64::from(k), 0.0, -7_000.0 * turn);
+            let ground = f64::from(field.ground(WorldPos::from_metres(at), 0.0).height);
+            let height = [3.0, 40.0, 300.0, 3000.0][k as usize % 4];
+            let eye = WorldPos::from_metres(at + glam::DVec3::Y * (ground + height));
+            let mut view = View {
+                eye,
+                ..Default::default()
+            };
+            let pitch = [-70.0, -30.0, 0.0, 15.0, 60.0][k as usize % 5];
+            view.look(turn, f64::to_radians(pitch), 1.0, 1.8);
+            let rays = view.rays().unwrap();
+            let nearest = nearest_ground(&field, eye);
+            let said = nearest_in_view(&field, eye, rays, azimuths(rays), nearest);
+            let (along, through) = said.map_or((1e5, 1e5), |[a, t]| (a, t));
+            away += u32::from(along > 2.0 * nearest);
+            // All ground up to there, on a fine grid, that lies before the eye is beyond the border of the picture.
+            let axes = glam::Mat3::from_cols(rays[0], rays[1], rays[2]).inverse();
+            for i in 0..720 {
+                let (sine, cosine) = f64::to_radians(0.5 * f64::from(i)).sin_cos();
+                for j in 1..200 {
+                    let distance = (0.005 * f64::from(j) * along).min(2e4);
+                    let p = [cosine * distance, sine * distance].map(|c| c as f32);
+                    let ground = field.ground_from(field.place(eye), p, 0.01 * distance as f32);
+                    let rise = f64::from(ground.height) - eye.altitude();
+                    let seen = axes * Vec3::new(p[0], rise as f32, p[1]);
+                    let inside = seen.x > 0.0 && seen.y.abs().max(seen.z.abs()) < seen.x;
+                    assert!(
+                        !inside || distance >= 0.999 * along,
+                        "{k}: ground at {distance} m, said {along} m"
+                    );
+                    assert!(!inside || distance.hypot(rise) > 0.8 * through, "{k}");
+                }
+            }
+        }
+        assert!(away > 10, "{away} of 60");
     }
 }

@@ -134,9 +134,14 @@ impl Host {
     fn frame(&mut self, view: &View, scene: &Scene) -> Vec<[f64; 3]> {
         let gpu = gpu();
         let (colors, distances) = seen(&self.temporal.shifted(view), self.taken, scene);
+        // What is infinitely far is transparent.
         let texels: Vec<u8> = colors
             .iter()
-            .flat_map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0])
+            .zip(&distances)
+            .flat_map(|(c, d)| {
+                let alpha = f32::from(u8::from(d.is_finite()));
+                [c[0] as f32, c[1] as f32, c[2] as f32, alpha]
+            })
             .flat_map(f32::to_le_bytes)
             .collect();
         // As the projection has it; the near plane lies at a metre.
@@ -276,6 +281,59 @@ fn what_was_hidden_has_no_history() {
                 "pixel {k}: {color:?}"
             );
         }
+    }
+}
+
+/// A post before nothing, that the eye passes: squares of the picture without it are left out, and nothing else changes.
+#[test]
+fn what_shows_nothing_is_left_out() {
+    let post = |eye: DVec3, dir: DVec3| {
+        let p = eye + dir * ((-20.0 - eye.z) / dir.z);
+        if p.x > 6.0 && p.x < 9.0 && p.y < 1.0 {
+            let light = (p.x / 0.9).floor() as i64 + (p.y / 0.9).floor() as i64;
+            ([0.2 + 0.6 * light.rem_euclid(2) as f64; 3], eye.z + 20.0)
+        } else {
+            ([0.0; 3], f64::INFINITY)
+        }
+    };
+    for (taken, sharp) in [(SIZE, true), ([32, 18], false), ([26, 15], true)] {
+        let run = |has_empty: bool| {
+            let mut host = Host::new(still(TemporalOptions {
+                taken,
+                sharp,
+                has_empty,
+                ..TemporalOptions::of(SIZE)
+            }));
+            let mut all = Vec::new();
+            for frame in 0..48 {
+                // It stands, flies to the right until the post has left the right half, and stands again.
+                let t = f64::from(frame - 8).clamp(0.0, 30.0);
+                let mut view = view();
+                view.eye = view.eye.moved_by(DVec3::new(0.5 * t, 0.0, 0.0));
+                all.push(host.frame(&view, &post));
+            }
+            all
+        };
+        let (whole, less) = (run(false), run(true));
+        for (frame, (a, b)) in whole.iter().zip(&less).enumerate() {
+            let off = (0..a.len())
+                .flat_map(|k| (0..3).map(move |c| (k, c)))
+                .map(|(k, c)| (a[k][c] - b[k][c]).abs())
+                .fold(0.0, f64::max);
+            assert!(off < 0.01, "{taken:?} frame {frame}: {off}");
+        }
+        let shown = |p: &[[f64; 3]], left: bool| {
+            (0..p.len()).any(|k| (k as u32 % SIZE[0] < 32) == left && p[k][0] > 0.1)
+        };
+        // The post goes from the right half to the left one, which was left out before, as the other is now.
+        assert!(
+            !shown(&less[0], true) && shown(&less[0], false),
+            "{taken:?}"
+        );
+        assert!(
+            shown(&less[47], true) && !shown(&less[47], false),
+            "{taken:?}"
+        );
     }
 }
 

@@ -47,45 +47,68 @@ struct TerrainView {
 @group(0) @binding(2) var<uniform> clip: Clip;
 @group(1) @binding(1) var sectors: texture_2d<f32>;
 
+const COLUMNS: f32 = 16.0;
+const ROWS: f32 = 24.0;
+
 fn ray_through(at: vec2<f32>) -> vec3<f32> {
     return draw_view.ray_middle + at.x * draw_view.ray_right + at.y * draw_view.ray_up;
 }
 
-// Tiles of the picture, 16 across and 12 down, two triangles each; those in which all rays pass above the ground around them have no size.
+// Least tangent of the elevation of the rays from `left` to `right` at a height of the picture: along an edge, which is a great circle, the tangent is a cosine of the azimuth.
+fn lowest(left: f32, right: f32, y: f32) -> f32 {
+    let a = ray_through(vec2<f32>(left, y));
+    let b = ray_through(vec2<f32>(right, y));
+    return min(a.y / max(length(a.xz), 1e-6), b.y / max(length(b.xz), 1e-6));
+}
+
+// Columns of the picture, two triangles each, from the first to the last of their rows in which a ray comes down to the ground around it; those without any have no size.
 @vertex
 fn cover(@builtin(vertex_index) index: u32) -> Corner {
-    let tile = index / 6u;
+    let column = index / 6u;
     let corner = index % 6u;
     let k = select(select(3u, corner % 3u, corner == 4u), select(corner, 2u, corner == 3u), corner < 4u);
-    let size = vec2<f32>(0.125, 0.16666667);
-    let place = vec2<f32>(f32(tile % 16u), f32(tile / 16u));
-    let at = (place + vec2<f32>(f32(k & 1u), f32(k >> 1u))) * size - 1.0;
-    let middle = ray_through((place + 0.5) * size - 1.0);
-    // Least tangent of the elevation and the azimuths of the corners: along an edge, which is a great circle, the tangent is a cosine of the azimuth.
-    var least = 1e30;
+    let width = 2.0 / COLUMNS;
+    let height = 2.0 / ROWS;
+    let near_x = f32(column) * width - 1.0;
+    let far_x = near_x + width;
+    let middle = ray_through(vec2<f32>(near_x + 0.5 * width, 0.0));
+    // Azimuths of the corners of all rows.
     var left = 0.0;
     var right = 0.0;
     for (var j = 0; j < 4; j++) {
-        let ray = ray_through((place + vec2<f32>(f32(j & 1), f32(j >> 1u))) * size - 1.0);
-        least = min(least, ray.y / max(length(ray.xz), 1e-6));
+        let ray = ray_through(vec2<f32>(select(near_x, far_x, (j & 1) == 1), select(-1.0, 1.0, j > 1)));
         let turn = atan2(middle.x * ray.z - middle.z * ray.x, dot(middle.xz, ray.xz));
         left = min(left, turn);
         right = max(right, turn);
     }
-    // Tiles around the zenith see all sectors.
+    // Columns around the zenith see all sectors.
     let wide = right - left > 1.2;
     let azimuth = atan2(middle.z, middle.x);
     let by_radian = f32(clip.sectors) * 0.15915494309;
     let first = select(i32(floor((azimuth + left - 1e-3) * by_radian)), clip.first_sector, wide);
     let last = select(i32(floor((azimuth + right + 1e-3) * by_radian)), clip.first_sector + clip.made_sectors - 1, wide);
-    let column = i32(textureDimensions(sectors).x) - 1;
+    let whole = i32(textureDimensions(sectors).x) - 1;
     var skyline = -1e30;
     for (var j = first; j <= last; j++) {
-        skyline = max(skyline, textureLoad(sectors, vec2<i32>(column, j & (clip.sectors - 1)), 0).x);
+        skyline = max(skyline, textureLoad(sectors, vec2<i32>(whole, j & (clip.sectors - 1)), 0).x);
     }
-    let lower = least / select(max(cos(right - left), 0.3), 1.0, least > 0.0);
-    let seen = skyline >= lower - 1e-3 * (1.0 + abs(lower)) || (wide && least < 0.0);
-    return Corner(vec4<f32>(select(vec2<f32>(0.0), at, seen), 0.5, 1.0), ray_through(at));
+    let bend = select(max(cos(right - left), 0.3), 1.0, wide);
+    var bottom = 2.0;
+    var top = -2.0;
+    var below = lowest(near_x, far_x, -1.0);
+    for (var j = 0; j < i32(ROWS); j++) {
+        let low = f32(j) * height - 1.0;
+        let above = lowest(near_x, far_x, low + height);
+        let least = min(below, above);
+        let bound = least / select(bend, 1.0, least > 0.0);
+        if skyline >= bound - 1e-3 * (1.0 + abs(bound)) || (wide && least < 0.0) {
+            bottom = min(bottom, low);
+            top = low + height;
+        }
+        below = above;
+    }
+    let at = vec2<f32>(select(near_x, far_x, (k & 1u) == 1u), select(bottom, top, k > 1u));
+    return Corner(vec4<f32>(select(vec2<f32>(0.0), at, top > bottom), 0.5, 1.0), ray_through(at));
 }
     }#
 }#

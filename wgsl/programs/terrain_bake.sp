@@ -4,12 +4,16 @@ Heights of a rectangle of one level of a clipmap; how high the ground stands aro
 
 #COMPUTE{
     #CODE{
+// Texels of a side of the squares of which the greatest heights are kept, and the binary logarithm of it.
+const PEAK: i32 = 2;
+const PEAK_SHIFT: u32 = 1u;
 #ifdef CLIP_SECTORS
 // The tangents that clear the ground of each ring of a sector; behind them the maxima of 8 and of 64 rings, and that of all.
-#import veduta::terrain::clipmap::{Clip, corners, level_of, ring_radius, clearing_tangent}
+#import veduta::terrain::clipmap::{Clip, level_of, ring_radius, clearing_tangent}
 
 @group(0) @binding(0) var<uniform> clip: Clip;
-@group(1) @binding(0) var heights: texture_2d_array<f32>;
+// The greatest heights of squares of texels.
+@group(1) @binding(0) var peaks: texture_2d_array<f32>;
 @group(1) @binding(1) var places: texture_2d<f32>;
 @group(1) @binding(2) var wrapping: sampler;
 @group(2) @binding(0) var sectors: texture_storage_2d<r32float, write>;
@@ -28,6 +32,7 @@ fn sweep(@builtin(local_invocation_index) index: u32, @builtin(workgroup_id) gro
     // How far the sector's directions reach along their longer axis: least and most at its borders, since 45 and 90 degrees are borders, or nearly.
     let along = vec2<f32>(max(abs(a.x), abs(a.y)), max(abs(b.x), abs(b.y)));
     let rounds = (clip.rings + 511) / 512;
+    let squares = clip.texels / PEAK;
     var whole = -1e30;
     for (var round = 0; round < rounds; round++) {
         let begin = (round * 64 + i32(index)) * 8;
@@ -46,11 +51,12 @@ fn sweep(@builtin(local_invocation_index) index: u32, @builtin(workgroup_id) gro
                 let place = textureLoad(places, vec2<i32>(level, 0), 0);
                 // The part of the ring that this level serves.
                 let edge = vec2<f32>((clip.reach + 1.0) * place.w);
-                let corner = vec2<i32>(floor(place.xy + max(low, -edge) * place.z));
-                let count = vec2<i32>(floor(place.xy + min(high, edge) * place.z)) - corner + 2;
+                let corner = vec2<i32>(floor(place.xy + max(low, -edge) * place.z)) >> vec2<u32>(PEAK_SHIFT);
+                let count = ((vec2<i32>(floor(place.xy + min(high, edge) * place.z)) + 1) >> vec2<u32>(PEAK_SHIFT)) - corner + 1;
                 for (var z = 0; z < count.y; z += 2) {
                     for (var x = 0; x < count.x; x += 2) {
-                        let h = corners(heights, wrapping, clip, corner + vec2<i32>(x, z), level);
+                        let middle = vec2<f32>(((corner + vec2<i32>(x, z)) & vec2<i32>(squares - 1)) + 1) / f32(squares);
+                        let h = textureGather(0, peaks, wrapping, middle, level);
                         top = max(top, max(max(h.x, h.y), max(h.z, h.w)));
                     }
                 }
@@ -170,16 +176,24 @@ struct Rectangle {
 @group(0) @binding(0) var<uniform> rectangle: Rectangle;
 @group(1) @binding(0) var relief: texture_2d<f32>;
 @group(2) @binding(0) var heights: texture_storage_2d_array<r32float, write>;
+@group(2) @binding(1) var peaks: texture_storage_2d_array<r32float, write>;
 
+// One invocation a square of texels; rectangles hold whole ones.
 @compute @workgroup_size(8, 8)
 fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
-    let at = vec2<i32>(id.xy);
-    if any(at >= rectangle.size) {
+    let first = vec2<i32>(id.xy) * PEAK;
+    if any(first >= rectangle.size) {
         return;
     }
-    let ground = land_at(relief, rectangle.field, FIELD_KIND, vec2<f32>(at) * rectangle.spacing, rectangle.spacing);
-    let texel = (rectangle.corner + at) & vec2<i32>(rectangle.texels - 1);
-    textureStore(heights, texel, rectangle.level, vec4<f32>(ground.height, 0.0, 0.0, 0.0));
+    let mask = vec2<i32>(rectangle.texels - 1);
+    var top = -1e30;
+    for (var k = 0; k < PEAK * PEAK; k++) {
+        let at = first + vec2<i32>(k & (PEAK - 1), k >> PEAK_SHIFT);
+        let height = land_at(relief, rectangle.field, FIELD_KIND, vec2<f32>(at) * rectangle.spacing, rectangle.spacing).height;
+        top = max(top, height);
+        textureStore(heights, (rectangle.corner + at) & mask, rectangle.level, vec4<f32>(height, 0.0, 0.0, 0.0));
+    }
+    textureStore(peaks, ((rectangle.corner + first) & mask) >> vec2<u32>(PEAK_SHIFT), rectangle.level, vec4<f32>(top, 0.0, 0.0, 0.0));
 }
 #endif
 #endif
