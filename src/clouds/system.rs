@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::order_table::{OrderTable, check_cells};
 use super::tile::{Tile, slant};
 use super::{AirLights, CloudDeck, Orders, fault};
+use crate::atmosphere::{Atmosphere, SkyTables};
 use crate::error::Error;
 use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
 use crate::program::{Pipeline, PipelineOptions, ProgramSet};
@@ -129,18 +130,21 @@ pub struct CloudsOptions {
     pub far: f64,
     /// Whether the host's depth buffer hides clouds; [`Clouds::set_host`] tells it.
     pub over_depth: bool,
+    /// The air before the clouds, if they are to show it: [`Clouds::set_air`] tells the tables of the sky that it is taken from. The picture below must have its air in it already.
+    pub air: Option<Atmosphere>,
     /// Which light: scattered once, with what comes from sky and ground scattered without shadows; or any number of times, of all three.
     pub orders: Orders,
 }
 
 impl Default for CloudsOptions {
-    /// The layer of the preset `thesis` with the quality of `high`, to 80 km, without a depth buffer, light of all orders.
+    /// The layer of the preset `thesis` with the quality of `high`, to 80 km, without a depth buffer or air, light of all orders.
     fn default() -> Self {
         CloudsOptions {
             quality: CloudQuality::of(&Preset::High),
             deck: CloudDeck::default(),
             far: 80_000.0,
             over_depth: false,
+            air: None,
             orders: Orders::All,
         }
     }
@@ -184,6 +188,10 @@ pub struct Clouds {
     held: Vec<u8>,
     host: Option<wgpu::TextureView>,
     over_depth: bool,
+    /// Flags of the program for the air that is shown; none without.
+    air_features: Option<&'static [&'static str]>,
+    /// The tables of the sky, and the colour of its sun.
+    air: Option<(wgpu::BindGroup, Vec3)>,
     /// One for each tile.
     groups: Vec<wgpu::BindGroup>,
     /// Which tile is shown, and for which sun it was baked; none before the first.
@@ -286,6 +294,12 @@ impl Clouds {
         if orders.is_some() {
             features.push("CLOUD_ORDERS");
         }
+        let air_features = options.air.as_ref().map(Atmosphere::features);
+        if let (Some(air), Some(own)) = (&options.air, air_features) {
+            air.check()?;
+            features.push("CLOUD_AIR");
+            features.extend(own);
+        }
         let over = wgpu::BlendComponent {
             src_factor: wgpu::BlendFactor::One,
             dst_factor: wgpu::BlendFactor::SrcAlpha,
@@ -362,6 +376,8 @@ impl Clouds {
             held: Vec::new(),
             host: None,
             over_depth: options.over_depth,
+            air_features,
+            air: None,
             groups: Vec::new(),
             shown: None,
             coming: None,
@@ -434,6 +450,45 @@ impl Clouds {
         Ok(())
     }
 
+    /// Tells the tables of the sky behind the clouds, from which the air before them is taken: up to the mean distance of what is seen of the clouds. Again after a change of
+    /// [`SkyTables::set_atmosphere`]. In every frame the sky's `prepare`, for the same view, comes before what is drawn here.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for clouds that were made without `air`, or for air that needs other programs; for tables without the air before things, which a sky as
+    /// [`Background`](crate::atmosphere::SkyComposition::Background) does not keep.
+    pub fn set_air(&mut self, device: &wgpu::Device, tables: &SkyTables) -> Result<(), Error> {
+        let Some(features) = self.air_features else {
+            let domain = "given for clouds that are told tables of the air";
+            return Err(fault("options.air", "none", domain));
+        };
+        tables
+            .atmosphere()
+            .check_features("tables.atmosphere", features)?;
+        let (Some(light), Some(depths)) = (tables.aerial(), tables.aerial_depths()) else {
+            let domain = "tables of a sky that is composed with the host's depth, or made by `SkyTables::new`";
+            return Err(fault("tables.aerial", "none", domain));
+        };
+        let resources = [
+            tables.air().as_entire_binding(),
+            tables.eye().as_entire_binding(),
+            wgpu::BindingResource::Sampler(tables.sampler()),
+            wgpu::BindingResource::TextureView(light),
+            wgpu::BindingResource::TextureView(depths),
+        ];
+        let entries: Vec<_> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("veduta air before clouds"),
+            layout: &self.layouts[2],
+            entries: &entries,
+        });
+        let colour = tables.atmosphere().sun.colour.map(|c| c as f32);
+        self.air = Some((group, Vec3::from_array(colour)));
+        Ok(())
+    }
+
     /// What hosts need to shade their own things; none before the first [`Clouds::prepare`] of a view that can show the layer, and for a layer without clouds, whose
     /// shadow is 1 everywhere. Straight light alone: what the clouds scatter down is not in it.
     pub fn shadow(&self) -> Option<CloudShadow<'_>> {
@@ -457,14 +512,16 @@ impl Clouds {
         let orders = self.orders.as_ref().map(OrderTable::holds);
         let (textures, bytes, buffers, groups) = orders.unwrap_or_default();
         let more = u32::from(orders.is_some());
+        let air = u32::from(self.air.is_some());
         Resources {
             pipelines: 2 + 5 * more,
-            bind_groups: parts + 2 + tiles + groups,
+            bind_groups: parts + 2 + tiles + groups + air,
             bindings: parts
                 + 2
                 + more
                 + (2 + more + u32::from(self.over_depth)) * tiles
-                + 2 * groups,
+                + 2 * groups
+                + 5 * air,
             buffers: parts + 2 + buffers,
             buffer_bytes: self.tile.buffer_bytes() + DrawBlock::SIZE as u64 + bytes,
             textures: self.tile.views.len() as u32 + more,
@@ -578,6 +635,11 @@ impl Clouds {
                 0.0
             },
             clear: deck.clear_way() as f32,
+            air_light: self
+                .air
+                .as_ref()
+                .map_or(Vec3::ZERO, |(_, colour)| view.sun.irradiance * colour)
+                .to_array(),
             ..Default::default()
         };
         self.placed = Some([
@@ -699,7 +761,7 @@ impl Clouds {
     /// write it.
     ///
     /// # Errors
-    /// [`Error::OutOfDomain`] when a depth buffer is needed and [`Clouds::set_host`] has told none.
+    /// [`Error::OutOfDomain`] when a depth buffer is needed and [`Clouds::set_host`] has told none, or tables of the air and [`Clouds::set_air`] has told none.
     pub fn composite(&self, pass: &mut wgpu::RenderPass<'_>) -> Result<Work, Error> {
         if !self.seen {
             return Ok(Work::default());
@@ -712,9 +774,16 @@ impl Clouds {
                 "a depth buffer, told with `set_host`",
             ));
         };
+        if self.air_features.is_some() && self.air.is_none() {
+            let domain = "tables of the sky, told with `set_air`";
+            return Err(fault("air", "none", domain));
+        }
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.view_group, &[]);
         pass.set_bind_group(1, group, &[]);
+        if let Some((air, _)) = &self.air {
+            pass.set_bind_group(2, air, &[]);
+        }
         pass.draw(0..3, 0..1);
         Ok(Work {
             draws: 1,

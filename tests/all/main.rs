@@ -4,6 +4,7 @@ mod accuracy;
 mod air;
 mod atmosphere;
 mod clouds;
+mod cloud_frames;
 mod common;
 mod cubes;
 mod depth;

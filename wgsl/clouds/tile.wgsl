@@ -68,6 +68,8 @@ struct OrderedLight {
     transmittance: f32,
     /// Transmittance where the peak takes nothing away.
     kept_transmittance: f32,
+    /// Mean distance of what is seen of the clouds [m], by what each stretch takes of that transmittance; the layer's entry where there are none.
+    mean_distance: f32,
 }
 
 /// What the cells of a layer scatter at a point given relative to the eye, towards a view whose cosine to the sun is `nu`: of the sun's light for an
@@ -159,6 +161,7 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
     var left = 1.0;
     var once = vec2<f32>(0.0);
     var sent = vec3<f32>(0.0);
+    var weighted = 0.0;
     var s = 0.0;
     for (var i = 0; i < path.count && s < path.size && depth < deepest; i++) {
         s = min(s + max(path.even, -layer.clear * here.x), path.size);
@@ -174,13 +177,15 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
         let through = exp(-kept * depth);
         let half_way = 0.5 * (at + t);
         sent += (left - through) * cells_at(cells, linear, layer, dir.xz * half_way, path_altitude(path, half_way), nu);
+        weighted += (left - through) * half_way;
         left = through;
         lit = dim;
         reach = ahead;
         here = next;
         t = at;
     }
-    return OrderedLight(once.x, once.y, sent, exp(-depth), left);
+    let weight = 1.0 - left;
+    return OrderedLight(once.x, once.y, sent, exp(-depth), left, select(path.segment.near, weighted / max(weight, 1e-12), weight > 1e-6));
 }
 
 /// Light of the cloud layer along a view ray up to `max_distance`, in steps of one fetch, for an albedo and a phase function of 1. `steps` are those of a

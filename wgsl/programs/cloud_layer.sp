@@ -44,6 +44,8 @@ struct CloudDraw {
     sky_depth: f32,
     // Way that is free of clouds for each unit that the tile's density is below 0 [m].
     clear: f32,
+    // Irradiance of the sun at the top of the air that is seen before the clouds.
+    air_light: vec3<f32>,
 }
 
 @group(0) @binding(0) var<uniform> draw_view: CloudDraw;
@@ -70,6 +72,12 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::lighting::phase::{phase_double_henyey_greenstein}
 #endif
 #import veduta::planet::shell::{ground_distance}
+#ifdef CLOUD_AIR
+#import veduta::atmosphere::medium::{Air}
+#import veduta::atmosphere::sky_view::{SkyEye, sky_place_shown, sky_place_outside}
+#import veduta::atmosphere::ray::{AirLight, air_ray}
+#import veduta::atmosphere::aerial::{aerial_light}
+#endif
     }#
     #USE{ VARYING }#
     #CODE{
@@ -96,6 +104,36 @@ fn weight_at(i: i32) -> vec2<f32> {
 
 override CLOUD_STEPS: i32 = 64;
 
+#ifdef CLOUD_AIR
+// Air, eye and tables of the sky behind the clouds.
+@group(2) @binding(0) var<uniform> air: Air;
+@group(2) @binding(1) var<uniform> eye: SkyEye;
+@group(2) @binding(2) var clamped: sampler;
+@group(2) @binding(3) var air_table: texture_2d_array<f32>;
+@group(2) @binding(4) var air_depths: texture_2d<f32>;
+
+// Light and transmittance of the air up to a distance.
+fn air_before(dir: vec3<f32>, distance: f32) -> AirLight {
+    var place = sky_place_shown(eye, dir);
+    if eye.altitude > eye.top {
+        place = sky_place_outside(eye, dir);
+    }
+    let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
+    return aerial_light(air_table, air_depths, clamped, air, eye, place, distance - ray.from_eye, ray.length);
+}
+#endif
+
+// What is blended over the picture: light of clouds, behind the air, and transmittance.
+fn laid(dir: vec3<f32>, light: vec3<f32>, transmittance: f32, mean_distance: f32) -> vec4<f32> {
+#ifdef CLOUD_AIR
+    // The picture has the air before it in it, of which clouds hide what lies behind them.
+    let front = air_before(dir, mean_distance);
+    return vec4<f32>(front.transmittance * light + (1.0 - transmittance) * front.in_scatter * draw_view.air_light, transmittance);
+#else
+    return vec4<f32>(light, transmittance);
+#endif
+}
+
 @fragment
 fn draw(in: Corner) -> @location(0) vec4<f32> {
     let dir = normalize(in.ray);
@@ -119,11 +157,11 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     // What the peak scatters of the light behind.
     let behind = select(draw_view.above, draw_view.below, ground >= 0.0 || dir.y < 0.0) * (light.kept_transmittance - light.transmittance);
     let around = draw_view.above * light.before.y + draw_view.below * light.before.z + behind;
-    return vec4<f32>(sun * draw_view.sun_light + around, light.transmittance);
+    return laid(dir, sun * draw_view.sun_light + around, light.transmittance, light.mean_distance);
 #else
     let light = march_tile(tile, linear, layer, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS);
     let phase = phase_double_henyey_greenstein(nu, draw_view.g_forward, draw_view.g_backward, draw_view.backward_share);
-    return vec4<f32>(light.scatter * phase * draw_view.sun_light + (1.0 - light.transmittance) * draw_view.above, light.transmittance);
+    return laid(dir, light.scatter * phase * draw_view.sun_light + (1.0 - light.transmittance) * draw_view.above, light.transmittance, light.mean_distance);
 #endif
 }
     }#
