@@ -51,7 +51,10 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         "air_columns" | "air_diffuse" | "air_transmittance" | "sky_view" | "sky_refine"
         | "sky_columns" | "sky_aerial" | "sky_probe" | "sky_query" | "probe" => &[&[]],
         "terrain" => {
-            return vec![BTreeSet::new(), BTreeSet::from(["CLOUD_SHADOWS".to_owned()])];
+            return vec![
+                BTreeSet::new(),
+                BTreeSet::from(["CLOUD_SHADOWS".to_owned()]),
+            ];
         }
         "terrain_heights" | "terrain_globe" | "terrain_globe_heights" => {
             return vec![BTreeSet::new()];

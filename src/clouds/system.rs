@@ -181,7 +181,10 @@ pub struct Clouds {
     tile: Tile,
     /// Light of many orders; none for single scattering.
     orders: Option<OrderTable>,
-    pipeline: wgpu::RenderPipeline,
+    /// For an eye within the air, and where air is shown for one above it.
+    pipelines: Vec<wgpu::RenderPipeline>,
+    /// Whether the eye is above the air.
+    outside: bool,
     layouts: Vec<wgpu::BindGroupLayout>,
     view: wgpu::Buffer,
     view_group: wgpu::BindGroup,
@@ -190,8 +193,8 @@ pub struct Clouds {
     over_depth: bool,
     /// Flags of the program for the air that is shown; none without.
     air_features: Option<&'static [&'static str]>,
-    /// The tables of the sky, and the colour of its sun.
-    air: Option<(wgpu::BindGroup, Vec3)>,
+    /// The tables of the sky, the colour of its sun and the thickness of the air (m).
+    air: Option<(wgpu::BindGroup, Vec3, f64)>,
     /// One for each tile.
     groups: Vec<wgpu::BindGroup>,
     /// Which tile is shown, and for which sun it was baked; none before the first.
@@ -310,9 +313,13 @@ impl Clouds {
             dst_factor: wgpu::BlendFactor::SrcAlpha,
             operation: wgpu::BlendOperation::Add,
         };
-        let ready = programs.get("cloud_layer", &features)?.pipeline(
-            device,
-            &PipelineOptions {
+        let program = programs.get("cloud_layer", &features)?;
+        let ready = |outside: bool| {
+            let mut constants = vec![("CLOUD_STEPS", f64::from(quality.steps))];
+            if air_features.is_some() {
+                constants.push(("EYE_PLACE", if outside { 2.0 } else { 0.0 }));
+            }
+            let options = PipelineOptions {
                 targets: &[Some(wgpu::ColorTargetState {
                     format: targets.color_format,
                     blend: Some(wgpu::BlendState {
@@ -332,15 +339,22 @@ impl Clouds {
                         bias: Default::default(),
                     }),
                 sample_count: targets.sample_count,
-                constants: &[("CLOUD_STEPS", f64::from(quality.steps))],
+                constants: &constants,
                 ..Default::default()
-            },
-        )?;
-        let Pipeline::Render(pipeline) = ready.pipeline else {
-            return Err(Error::MissingStage {
-                program: "cloud_layer".to_owned(),
-            });
+            };
+            let ready = program.pipeline(device, &options)?;
+            match ready.pipeline {
+                Pipeline::Render(pipeline) => Ok((pipeline, ready.bind_group_layouts)),
+                Pipeline::Compute(_) => Err(Error::MissingStage {
+                    program: "cloud_layer".to_owned(),
+                }),
+            }
         };
+        let (inside, layouts) = ready(false)?;
+        let mut pipelines = vec![inside];
+        if air_features.is_some() {
+            pipelines.push(ready(true)?.0);
+        }
         let view = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("veduta cloud view"),
             size: DrawBlock::SIZE as u64,
@@ -349,7 +363,7 @@ impl Clouds {
         });
         let view_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("veduta cloud view"),
-            layout: &ready.bind_group_layouts[0],
+            layout: &layouts[0],
             entries: &[
                 Some((0, &view)),
                 orders.as_ref().map(|table| (1, &table.weights)),
@@ -369,8 +383,9 @@ impl Clouds {
             depth: targets.depth,
             tile,
             orders,
-            pipeline,
-            layouts: ready.bind_group_layouts,
+            pipelines,
+            outside: false,
+            layouts,
             view,
             view_group,
             held: Vec::new(),
@@ -485,7 +500,8 @@ impl Clouds {
             entries: &entries,
         });
         let colour = tables.atmosphere().sun.colour.map(|c| c as f32);
-        self.air = Some((group, Vec3::from_array(colour)));
+        let thickness = tables.atmosphere().thickness;
+        self.air = Some((group, Vec3::from_array(colour), thickness));
         Ok(())
     }
 
@@ -514,7 +530,7 @@ impl Clouds {
         let more = u32::from(orders.is_some());
         let air = u32::from(self.air.is_some());
         Resources {
-            pipelines: 2 + 5 * more,
+            pipelines: 1 + self.pipelines.len() as u32 + 5 * more,
             bind_groups: parts + 2 + tiles + groups + air,
             bindings: parts
                 + 2
@@ -581,6 +597,8 @@ impl Clouds {
             let baked = (shown, sun.to_array());
             table.advance(queue, encoder, baked, fresh, swapped, &mut work);
         }
+        let top = self.air.as_ref().map_or(f64::INFINITY, |air| air.2);
+        self.outside = eye.altitude() > top;
         let sun = self.shown.map_or(to_sun, |s| s.1);
         let deck = &self.deck;
         let period = deck.period();
@@ -638,7 +656,7 @@ impl Clouds {
             air_light: self
                 .air
                 .as_ref()
-                .map_or(Vec3::ZERO, |(_, colour)| view.sun.irradiance * colour)
+                .map_or(Vec3::ZERO, |(_, colour, _)| view.sun.irradiance * colour)
                 .to_array(),
             ..Default::default()
         };
@@ -778,10 +796,10 @@ impl Clouds {
             let domain = "tables of the sky, told with `set_air`";
             return Err(fault("air", "none", domain));
         }
-        pass.set_pipeline(&self.pipeline);
+        pass.set_pipeline(&self.pipelines[usize::from(self.outside)]);
         pass.set_bind_group(0, &self.view_group, &[]);
         pass.set_bind_group(1, group, &[]);
-        if let Some((air, _)) = &self.air {
+        if let Some((air, ..)) = &self.air {
             pass.set_bind_group(2, air, &[]);
         }
         pass.draw(0..3, 0..1);

@@ -131,8 +131,7 @@ fn stretches(
                     nu,
                     t,
                 );
-                let sun =
-                    exact::sun_depth(&layer, RADIUS, relative, altitude, ray.to_sun, mu, 24);
+                let sun = exact::sun_depth(&layer, RADIUS, relative, altitude, ray.to_sun, mu, 24);
                 light += (-depth - sun).exp() * (1.0 - (-added).exp()) * phase;
             }
             depth += added;
@@ -276,8 +275,7 @@ fn tables_of_the_air_that_do_not_fit_are_refused() {
     };
     let settings = Settings::resolve(veduta::programs(), &Preset::Low, None, &[]).unwrap();
     let quality = SkyQuality::of(&settings);
-    let tables =
-        SkyTables::new(device, veduta::programs(), &Default::default(), &quality).unwrap();
+    let tables = SkyTables::new(device, veduta::programs(), &Default::default(), &quality).unwrap();
     let text = new(&small)
         .set_air(device, &tables)
         .unwrap_err()

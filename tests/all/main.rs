@@ -3,8 +3,8 @@
 mod accuracy;
 mod air;
 mod atmosphere;
-mod clouds;
 mod cloud_frames;
+mod clouds;
 mod common;
 mod cubes;
 mod depth;

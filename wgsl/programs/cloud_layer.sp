@@ -105,6 +105,9 @@ fn weight_at(i: i32) -> vec2<f32> {
 override CLOUD_STEPS: i32 = 64;
 
 #ifdef CLOUD_AIR
+// Where the eye is: above the air with 2.
+override EYE_PLACE: i32 = 0;
+
 // Air, eye and tables of the sky behind the clouds.
 @group(2) @binding(0) var<uniform> air: Air;
 @group(2) @binding(1) var<uniform> eye: SkyEye;
@@ -115,7 +118,7 @@ override CLOUD_STEPS: i32 = 64;
 // Light and transmittance of the air up to a distance.
 fn air_before(dir: vec3<f32>, distance: f32) -> AirLight {
     var place = sky_place_shown(eye, dir);
-    if eye.altitude > eye.top {
+    if EYE_PLACE == 2 {
         place = sky_place_outside(eye, dir);
     }
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);

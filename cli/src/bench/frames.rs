@@ -524,10 +524,9 @@ fn line(
     let truth = bench.reference(&job(&steps(CONVERGED, true))?, 0.0, SAMPLES[1])?;
     let truth = truth.display(exposure);
     let mut thesis_psnr = [0.0; 2];
-    for (found, job) in
-        thesis_psnr
-            .iter_mut()
-            .zip([job(&[])?, job(&steps((32, 12), false))?])
+    for (found, job) in thesis_psnr
+        .iter_mut()
+        .zip([job(&[])?, job(&steps((32, 12), false))?])
     {
         *found = psnr(&bench.picture(&job, 0.0, 1)?.display(exposure), &truth);
     }
