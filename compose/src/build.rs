@@ -104,9 +104,12 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             let set = |way: &[&str], air: &[&str]| {
                 way.iter().chain(air).map(|f| (*f).to_owned()).collect()
             };
-            return airs
+            let drawn = airs
                 .iter()
-                .flat_map(|air| ways.iter().map(|way| set(way, air)))
+                .flat_map(|air| ways.iter().map(move |way| set(way, air)));
+            let laid: [&[&str]; 2] = [&[], &["CLOUD_OVER_DEPTH"]];
+            return drawn
+                .chain(laid.iter().map(|way| set(&["CLOUD_UPSAMPLE"], way)))
                 .collect();
         }
         "cloud_volume" => {

@@ -44,6 +44,9 @@ impl CloudLights {
     }
 }
 
+/// Format of a layer in half as many pixels a side.
+const COARSE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+
 /// How finely a layer is baked and marched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CloudQuality {
@@ -65,6 +68,11 @@ pub struct CloudQuality {
     pub frames: u32,
     /// Cells along the edge of the table of light of all orders, a multiple of 32 in [32, 128], and along its height, in [2, 64].
     pub cells: [u32; 2],
+    /// Whether the march is drawn for half as many pixels a side, by [`Clouds::encode_volumes`], and laid over the picture by the four around each pixel whose rays end as far away.
+    pub half: bool,
+    /// Whether marches start at places that a mask of the pixels shifts: noise without coarse grain, where too few steps would show bands. Projections that a host shifts from frame to
+    /// frame, as those of [`Temporal`](crate::temporal::Temporal), shift the mask too, so that joined frames are those of many steps.
+    pub jitter: bool,
 }
 
 impl CloudQuality {
@@ -84,6 +92,18 @@ impl CloudQuality {
             second_tile: true,
             frames: 30,
             cells: [32, cell_levels],
+            half: false,
+            jitter: false,
+        }
+    }
+
+    /// That of a preset for frames that [`Temporal`](crate::temporal::Temporal) joins: fewer steps, at places that the frames shift.
+    pub fn joined(preset: &Preset) -> CloudQuality {
+        let quality = CloudQuality::of(preset);
+        CloudQuality {
+            steps: quality.steps.min(40),
+            jitter: true,
+            ..quality
         }
     }
 
@@ -185,6 +205,8 @@ pub struct Clouds {
     pipelines: Vec<wgpu::RenderPipeline>,
     /// Whether the eye is above the air.
     outside: bool,
+    /// What lays a picture of half as many pixels a side over the host's.
+    half: Option<Half>,
     layouts: Vec<wgpu::BindGroupLayout>,
     view: wgpu::Buffer,
     view_group: wgpu::BindGroup,
@@ -208,6 +230,18 @@ pub struct Clouds {
     /// Fields of `CloudTile` for the last eye.
     placed: Option<[f32; 10]>,
     seen: bool,
+}
+
+/// What a layer in half as many pixels a side is laid over a picture with.
+#[derive(Debug)]
+struct Half {
+    pipeline: wgpu::RenderPipeline,
+    layouts: Vec<wgpu::BindGroupLayout>,
+    view_group: wgpu::BindGroup,
+    /// The layer, and what reads it; none before a size is told.
+    coarse: Option<(wgpu::TextureView, wgpu::BindGroup)>,
+    /// Pixels a side of the layer for each of the host's picture.
+    share: [f32; 2],
 }
 
 /// What a host's shader needs for the shadow of a layer: `cloud_shadow` of the module `veduta::clouds::tile`.
@@ -314,15 +348,32 @@ impl Clouds {
             operation: wgpu::BlendOperation::Add,
         };
         let program = programs.get("cloud_layer", &features)?;
-        let ready = |outside: bool| {
-            let mut constants = vec![("CLOUD_STEPS", f64::from(quality.steps))];
-            if air_features.is_some() {
+        let laid_features: &[&str] = if options.over_depth {
+            &["CLOUD_UPSAMPLE", "CLOUD_OVER_DEPTH"]
+        } else {
+            &["CLOUD_UPSAMPLE"]
+        };
+        // The march, or what lays a coarse one over the picture.
+        let ready = |march: bool, outside: bool| {
+            let mut constants = Vec::new();
+            if march {
+                constants = vec![
+                    ("CLOUD_STEPS", f64::from(quality.steps)),
+                    ("CLOUD_MASK", f64::from(u8::from(quality.jitter))),
+                ];
+                if options.over_depth {
+                    constants.push(("CLOUD_HALF", f64::from(u8::from(quality.half))));
+                }
+            }
+            if march && air_features.is_some() {
                 constants.push(("EYE_PLACE", if outside { 2.0 } else { 0.0 }));
             }
+            // A coarse picture holds nothing but the layer.
+            let coarse = march && quality.half;
             let options = PipelineOptions {
                 targets: &[Some(wgpu::ColorTargetState {
-                    format: targets.color_format,
-                    blend: Some(wgpu::BlendState {
+                    format: if coarse { COARSE } else { targets.color_format },
+                    blend: (!coarse).then_some(wgpu::BlendState {
                         color: over,
                         alpha: keep,
                     }),
@@ -330,7 +381,7 @@ impl Clouds {
                 })],
                 depth_stencil: targets
                     .depth_format
-                    .filter(|_| !options.over_depth)
+                    .filter(|_| !options.over_depth && !coarse)
                     .map(|format| wgpu::DepthStencilState {
                         format,
                         depth_write_enabled: Some(false),
@@ -338,11 +389,17 @@ impl Clouds {
                         stencil: Default::default(),
                         bias: Default::default(),
                     }),
-                sample_count: targets.sample_count,
+                sample_count: if coarse { 1 } else { targets.sample_count },
                 constants: &constants,
                 ..Default::default()
             };
-            let ready = program.pipeline(device, &options)?;
+            let ready = if march {
+                program.pipeline(device, &options)?
+            } else {
+                programs
+                    .get("cloud_layer", laid_features)?
+                    .pipeline(device, &options)?
+            };
             match ready.pipeline {
                 Pipeline::Render(pipeline) => Ok((pipeline, ready.bind_group_layouts)),
                 Pipeline::Compute(_) => Err(Error::MissingStage {
@@ -350,10 +407,10 @@ impl Clouds {
                 }),
             }
         };
-        let (inside, layouts) = ready(false)?;
+        let (inside, layouts) = ready(true, false)?;
         let mut pipelines = vec![inside];
         if air_features.is_some() {
-            pipelines.push(ready(true)?.0);
+            pipelines.push(ready(true, true)?.0);
         }
         let view = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("veduta cloud view"),
@@ -376,6 +433,25 @@ impl Clouds {
             })
             .collect::<Vec<_>>(),
         });
+        let half = if quality.half {
+            let (pipeline, layouts) = ready(false, false)?;
+            Some(Half {
+                view_group: device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some("veduta cloud view"),
+                    layout: &layouts[0],
+                    entries: &[wgpu::BindGroupEntry {
+                        binding: 0,
+                        resource: view.as_entire_binding(),
+                    }],
+                }),
+                pipeline,
+                layouts,
+                coarse: None,
+                share: [0.5; 2],
+            })
+        } else {
+            None
+        };
         let mut clouds = Clouds {
             deck: options.deck.clone(),
             quality,
@@ -385,6 +461,7 @@ impl Clouds {
             orders,
             pipelines,
             outside: false,
+            half,
             layouts,
             view,
             view_group,
@@ -462,6 +539,61 @@ impl Clouds {
         }
         self.host = Some(depth.clone());
         self.bind(device);
+        if self.half.is_some() {
+            let texture = depth.texture();
+            self.set_size(device, [texture.width(), texture.height()])?;
+        }
+        Ok(())
+    }
+
+    /// Tells width and height of the host's picture to clouds of [`CloudQuality::half`]; [`Clouds::set_host`] does it by the depth buffer. Again after each change of size.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for clouds without `half`, and for a size that the device's textures cannot have.
+    pub fn set_size(&mut self, device: &wgpu::Device, size: [u32; 2]) -> Result<(), Error> {
+        let most = device.limits().max_texture_dimension_2d;
+        if !size.iter().all(|n| (1..=most).contains(n)) {
+            let domain = format!("each in [1, {most}] pixels");
+            return Err(fault("size", format!("{size:?}"), &domain));
+        }
+        let Some(half) = &mut self.half else {
+            let domain = "true for clouds that are told a size";
+            return Err(fault("quality.half", false, domain));
+        };
+        let target = device
+            .create_texture(&wgpu::TextureDescriptor {
+                label: Some("veduta coarse clouds"),
+                size: wgpu::Extent3d {
+                    width: size[0].div_ceil(2),
+                    height: size[1].div_ceil(2),
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: COARSE,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                    | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            })
+            .create_view(&Default::default());
+        let entries: Vec<_> = self
+            .host
+            .iter()
+            .map(|depth| (2, depth))
+            .chain([(4, &target)])
+            .map(|(binding, view)| wgpu::BindGroupEntry {
+                binding,
+                resource: wgpu::BindingResource::TextureView(view),
+            })
+            .collect();
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("veduta coarse clouds"),
+            layout: &half.layouts[1],
+            entries: &entries,
+        });
+        half.coarse = Some((target, group));
+        half.share = size.map(|n| n.div_ceil(2) as f32 / n as f32);
         Ok(())
     }
 
@@ -529,19 +661,27 @@ impl Clouds {
         let (textures, bytes, buffers, groups) = orders.unwrap_or_default();
         let more = u32::from(orders.is_some());
         let air = u32::from(self.air.is_some());
+        let coarse = self.half.as_ref().and_then(|half| half.coarse.as_ref());
+        let laid = u32::from(self.half.is_some());
+        let held = u32::from(coarse.is_some());
+        let coarse_bytes = coarse.map_or(0, |(view, _)| {
+            8 * u64::from(view.texture().width()) * u64::from(view.texture().height())
+        });
         Resources {
-            pipelines: 1 + self.pipelines.len() as u32 + 5 * more,
-            bind_groups: parts + 2 + tiles + groups + air,
+            pipelines: 1 + self.pipelines.len() as u32 + 5 * more + laid,
+            bind_groups: parts + 2 + tiles + groups + air + laid + held,
             bindings: parts
                 + 2
                 + more
                 + (2 + more + u32::from(self.over_depth)) * tiles
                 + 2 * groups
-                + 5 * air,
+                + 5 * air
+                + laid
+                + held * (1 + u32::from(self.over_depth)),
             buffers: parts + 2 + buffers,
             buffer_bytes: self.tile.buffer_bytes() + DrawBlock::SIZE as u64 + bytes,
-            textures: self.tile.views.len() as u32 + more,
-            texture_bytes: self.tile.texture_bytes() + textures,
+            textures: self.tile.views.len() as u32 + more + held,
+            texture_bytes: self.tile.texture_bytes() + textures + coarse_bytes,
             samplers: 1,
         }
     }
@@ -653,6 +793,16 @@ impl Clouds {
                 0.0
             },
             clear: deck.clear_way() as f32,
+            // The same for one projection, and as good as any for each of those that frames are shifted by.
+            start: if self.quality.jitter {
+                let [x, y] = [view.projection.z_axis.x, view.projection.z_axis.y];
+                (12_345.68 * x + 7654.321 * y)
+                    .rem_euclid(1.0)
+                    .min(0.999_999)
+            } else {
+                0.0
+            },
+            coarse: self.half.as_ref().map_or([0.5; 2], |half| half.share),
             air_light: self
                 .air
                 .as_ref()
@@ -775,6 +925,34 @@ impl Clouds {
         }
     }
 
+    /// Draws the layer in half as many pixels a side, for [`CloudQuality::half`]: after the host's things stand in the depth buffer, and before the pass of [`Clouds::composite`].
+    /// Nothing is done for other clouds.
+    ///
+    /// # Errors
+    /// As [`Clouds::composite`].
+    pub fn encode_volumes(&self, encoder: &mut wgpu::CommandEncoder) -> Result<Work, Error> {
+        let Some(half) = self.half.as_ref().filter(|_| self.seen) else {
+            return Ok(Work::default());
+        };
+        let Some((target, _)) = &half.coarse else {
+            return Err(fault("size", "none", "told with `set_size` or `set_host`"));
+        };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("veduta coarse clouds"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            ..Default::default()
+        });
+        self.march(&mut pass)
+    }
+
     /// Lays the clouds over what the pass holds: radiance times transmittance, plus light. Clouds over a depth buffer must be drawn in a pass that does not
     /// write it.
     ///
@@ -784,6 +962,24 @@ impl Clouds {
         if !self.seen {
             return Ok(Work::default());
         }
+        let Some(half) = &self.half else {
+            return self.march(pass);
+        };
+        let Some((_, coarse)) = &half.coarse else {
+            return Err(fault("size", "none", "told with `set_size` or `set_host`"));
+        };
+        pass.set_pipeline(&half.pipeline);
+        pass.set_bind_group(0, &half.view_group, &[]);
+        pass.set_bind_group(1, coarse, &[]);
+        pass.draw(0..3, 0..1);
+        Ok(Work {
+            draws: 1,
+            ..Work::default()
+        })
+    }
+
+    /// Draws the march.
+    fn march(&self, pass: &mut wgpu::RenderPass<'_>) -> Result<Work, Error> {
         let shown = self.shown.map_or(0, |s| s.0);
         let Some(group) = self.groups.get(shown) else {
             return Err(fault(

@@ -57,6 +57,7 @@ fn over_black(clouds: &mut Clouds, view: &View, lights: &CloudLights) -> Vec<[f3
     let _ = clouds
         .prepare(&gpu.queue, &mut encoder, view, lights)
         .unwrap();
+    let _ = clouds.encode_volumes(&mut encoder).unwrap();
     {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -451,4 +452,165 @@ fn clouds_shade_the_ground() {
         .unwrap_err()
         .to_string();
     assert!(text.contains("terrain.cloud_shadows"), "{text}");
+}
+
+/// A depth buffer as large as the picture whose left part is a wall at a distance (m), behind which there is sky.
+fn walled(view: &View, distance: f32, columns: u32) -> wgpu::TextureView {
+    let gpu = gpu();
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d {
+            width: WIDTH,
+            height: HEIGHT,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Depth32Float,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    let target = texture.create_view(&Default::default());
+    let module = gpu
+        .device
+        .create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: None,
+            source: wgpu::ShaderSource::Wgsl(
+                "override AT: f32 = 0.0;
+@vertex
+fn cover(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {
+    return vec4<f32>(select(-1.0, 3.0, i == 1u), select(-1.0, 3.0, i == 2u), AT, 1.0);
+}"
+                .into(),
+            ),
+        });
+    let pipeline = gpu
+        .device
+        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: None,
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("cover"),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: &[("AT", f64::from(view.projection.w_axis.z / distance))],
+                    ..Default::default()
+                },
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: wgpu::TextureFormat::Depth32Float,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::Always),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment: None,
+            multiview_mask: None,
+            cache: None,
+        });
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &target,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_pipeline(&pipeline);
+        pass.set_scissor_rect(0, 0, columns, HEIGHT);
+        pass.draw(0..3, 0..1);
+    }
+    gpu.queue.submit([encoder.finish()]);
+    target
+}
+
+/// Half as many pixels a side, before the sky and before a wall within the layer: like the whole ones, and no cloud of the sky on the wall, nor the wall's in the sky.
+#[test]
+fn half_resolution_keeps_to_the_depth() {
+    let mut view = View {
+        eye: WorldPos::from_metres(DVec3::new(100.0, 300.0, -300.0)),
+        ..Default::default()
+    };
+    view.sun.irradiance = Vec3::ONE;
+    // So narrow that a pixel is not much wider than the noise is fine.
+    view.look(0.4, 0.8, 0.4, 16.0 / 9.0);
+    let lights = CloudLights::clear(Vec3::ONE);
+    // An odd number of columns, so that texels of the coarse picture lie across the edge.
+    let columns = 31;
+    // The wall stands before the layer.
+    let wall = walled(&view, 2000.0, columns);
+    let draw = |half: bool, jitter: bool| {
+        let options = CloudsOptions {
+            quality: CloudQuality {
+                cells: [32, 2],
+                steps: 96,
+                half,
+                jitter,
+                ..CloudQuality::of(&Preset::Low)
+            },
+            over_depth: true,
+            orders: Orders::Single,
+            ..Default::default()
+        };
+        let device = &gpu().device;
+        let mut clouds = Clouds::new(device, veduta::programs(), &targets(), &options).unwrap();
+        clouds.set_host(device, &wall).unwrap();
+        over_black(&mut clouds, &view, &lights)
+    };
+    let (whole, half, shifted) = (draw(false, false), draw(true, false), draw(false, true));
+    let column = |i: usize| (i as u32) % WIDTH;
+    // Nothing on the wall, right up to the edge.
+    let on_wall = (0..whole.len()).filter(|i| column(*i) < columns);
+    for i in on_wall {
+        assert_eq!(whole[i][3], 1.0);
+        assert!(half[i][3] > 0.995, "{i}: {:?}", half[i]);
+    }
+    // Relative to the whole picture moved by some pixels, right or down.
+    let off_by = |other: &[[f32; 4]], first: u32, last: u32, moved: isize| {
+        let of = |p: &[[f32; 4]], i: usize| f64::from(p[i][1]);
+        let rows = WIDTH as usize..whole.len() - WIDTH as usize;
+        let inside = |i: &usize| (first..last).contains(&column(*i)) && rows.contains(i);
+        let all: Vec<usize> = (0..whole.len()).filter(inside).collect();
+        let square: f64 = all
+            .iter()
+            .map(|i| (of(other, *i) - of(&whole, i.wrapping_add_signed(moved))).powi(2))
+            .sum();
+        let power: f64 = all.iter().map(|i| of(&whole, *i).powi(2)).sum();
+        (square / power).sqrt()
+    };
+    let off = |other: &[[f32; 4]], first: u32, last: u32| off_by(other, first, last, 0);
+    let (open, edge) = (off(&half, 36, WIDTH - 1), off(&half, columns, columns + 2));
+    // It stands where the whole one does: moved either way it is off by more, and as much.
+    for step in [1, WIDTH as isize] {
+        let [one, other] = [-step, step].map(|moved| off_by(&half, 36, WIDTH - 1, moved));
+        println!("moved: {one:.4} and {other:.4}");
+        assert!(open < 0.8 * one.min(other));
+        assert!((one - other).abs() < 0.25 * (one + other));
+    }
+    let jitter = off(&shifted, columns, WIDTH);
+    println!(
+        "half resolution: {open:.4} of the light off, {edge:.4} beside the wall; shifted starts {jitter:.4}"
+    );
+    assert!(open < 0.2, "{open}");
+    // Beside the wall no worse than a neighbour taken for the pixel is.
+    assert!(edge < 0.3, "{edge}");
+    assert!(jitter > 1e-4 && jitter < 0.03, "{jitter}");
+    // What has no use for a size refuses it.
+    let options = CloudsOptions {
+        orders: Orders::Single,
+        ..Default::default()
+    };
+    let device = &gpu().device;
+    let mut clouds = Clouds::new(device, veduta::programs(), &targets(), &options).unwrap();
+    let text = clouds.set_size(device, [8, 8]).unwrap_err().to_string();
+    assert!(text.contains("quality.half"), "{text}");
 }
