@@ -150,7 +150,7 @@ pub struct CloudsOptions {
     pub far: f64,
     /// Whether the host's depth buffer hides clouds; [`Clouds::set_host`] tells it.
     pub over_depth: bool,
-    /// The air before the clouds, if they are to show it: [`Clouds::set_air`] tells the tables of the sky that it is taken from. The picture below must have its air in it already.
+    /// The air before the clouds, if they are to show it to eyes within the air; to those above it clouds show none: [`Clouds::set_air`] tells the tables of the sky that it is taken from. The picture below must have its air in it already.
     pub air: Option<Atmosphere>,
     /// Which light: scattered once, with what comes from sky and ground scattered without shadows; or any number of times, of all three.
     pub orders: Orders,
@@ -348,6 +348,13 @@ impl Clouds {
             operation: wgpu::BlendOperation::Add,
         };
         let program = programs.get("cloud_layer", &features)?;
+        // From above the air the clouds are drawn without it: llvmpipe 22.3 falls over the program for such an eye.
+        let bare: Vec<&str> = features
+            .iter()
+            .copied()
+            .filter(|f| !matches!(*f, "CLOUD_AIR" | "AIR_EIGHT_LANES"))
+            .collect();
+        let bare = programs.get("cloud_layer", &bare)?;
         let laid_features: &[&str] = if options.over_depth {
             &["CLOUD_UPSAMPLE", "CLOUD_OVER_DEPTH"]
         } else {
@@ -365,8 +372,8 @@ impl Clouds {
                     constants.push(("CLOUD_HALF", f64::from(u8::from(quality.half))));
                 }
             }
-            if march && air_features.is_some() {
-                constants.push(("EYE_PLACE", if outside { 2.0 } else { 0.0 }));
+            if march && air_features.is_some() && !outside {
+                constants.push(("EYE_PLACE", 0.0));
             }
             // A coarse picture holds nothing but the layer.
             let coarse = march && quality.half;
@@ -394,6 +401,7 @@ impl Clouds {
                 ..Default::default()
             };
             let ready = if march {
+                let program = if outside { bare } else { program };
                 program.pipeline(device, &options)?
             } else {
                 programs
@@ -995,7 +1003,7 @@ impl Clouds {
         pass.set_pipeline(&self.pipelines[usize::from(self.outside)]);
         pass.set_bind_group(0, &self.view_group, &[]);
         pass.set_bind_group(1, group, &[]);
-        if let Some((air, ..)) = &self.air {
+        if let Some((air, ..)) = self.air.as_ref().filter(|_| !self.outside) {
             pass.set_bind_group(2, air, &[]);
         }
         pass.draw(0..3, 0..1);
