@@ -50,7 +50,13 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         ],
         "air_columns" | "air_diffuse" | "air_transmittance" | "sky_view" | "sky_refine"
         | "sky_columns" | "sky_aerial" | "sky_probe" | "sky_query" | "probe" => &[&[]],
-        "terrain" | "terrain_heights" | "terrain_globe" | "terrain_globe_heights" => {
+        "terrain" => {
+            return vec![
+                BTreeSet::new(),
+                BTreeSet::from(["CLOUD_SHADOWS".to_owned()]),
+            ];
+        }
+        "terrain_heights" | "terrain_globe" | "terrain_globe_heights" => {
             return vec![BTreeSet::new()];
         }
         "terrain_bake" => {
@@ -97,8 +103,17 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 &["CLOUD_ORDERS"],
                 &["CLOUD_ORDERS", "CLOUD_OVER_DEPTH"],
             ];
-            let set = |flags: &&[&str]| flags.iter().map(|f| (*f).to_owned()).collect();
-            return ways.iter().map(set).collect();
+            let airs: [&[&str]; 3] = [&[], &["CLOUD_AIR"], &["CLOUD_AIR", "AIR_EIGHT_LANES"]];
+            let set = |way: &[&str], air: &[&str]| {
+                way.iter().chain(air).map(|f| (*f).to_owned()).collect()
+            };
+            let drawn = airs
+                .iter()
+                .flat_map(|air| ways.iter().map(move |way| set(way, air)));
+            let laid: [&[&str]; 2] = [&[], &["CLOUD_OVER_DEPTH"]];
+            return drawn
+                .chain(laid.iter().map(|way| set(&["CLOUD_UPSAMPLE"], way)))
+                .collect();
         }
         "cloud_volume" => {
             let ways: [&[&str]; 13] = [

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::order_table::{OrderTable, check_cells};
 use super::tile::{Tile, slant};
 use super::{AirLights, CloudDeck, Orders, fault};
+use crate::atmosphere::{Atmosphere, SkyTables};
 use crate::error::Error;
 use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
 use crate::program::{Pipeline, PipelineOptions, ProgramSet};
@@ -46,6 +47,9 @@ impl CloudLights {
     }
 }
 
+/// Format of a layer in half as many pixels a side.
+const COARSE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+
 /// How finely a layer is baked and marched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CloudQuality {
@@ -69,6 +73,11 @@ pub struct CloudQuality {
     pub cells: [u32; 2],
     /// Whether texels of the tile have 16 bits a number instead of 8: twice the memory, for errors below a hundredth.
     pub wide: bool,
+    /// Whether the march is drawn for half as many pixels a side, by [`Clouds::encode_volumes`], and laid over the picture by the four around each pixel whose rays end as far away.
+    pub half: bool,
+    /// Whether marches start at places that a mask of the pixels shifts: noise without coarse grain, where too few steps would show bands. Projections that a host shifts from frame to
+    /// frame, as those of [`Temporal`](crate::temporal::Temporal), shift the mask too, so that joined frames are those of many steps.
+    pub jitter: bool,
 }
 
 impl CloudQuality {
@@ -89,6 +98,18 @@ impl CloudQuality {
             frames: 30,
             cells: [32, cell_levels],
             wide: false,
+            half: false,
+            jitter: false,
+        }
+    }
+
+    /// That of a preset for frames that [`Temporal`](crate::temporal::Temporal) joins: fewer steps, at places that the frames shift.
+    pub fn joined(preset: &Preset) -> CloudQuality {
+        let quality = CloudQuality::of(preset);
+        CloudQuality {
+            steps: quality.steps.min(40),
+            jitter: true,
+            ..quality
         }
     }
 
@@ -135,18 +156,21 @@ pub struct CloudsOptions {
     pub far: f64,
     /// Whether the host's depth buffer hides clouds; [`Clouds::set_host`] tells it.
     pub over_depth: bool,
+    /// The air before the clouds, if they are to show it to eyes within the air; to those above it clouds show none: [`Clouds::set_air`] tells the tables of the sky that it is taken from. The picture below must have its air in it already.
+    pub air: Option<Atmosphere>,
     /// Which light: scattered once, with what comes from sky and ground scattered without shadows; or any number of times, of all three.
     pub orders: Orders,
 }
 
 impl Default for CloudsOptions {
-    /// The layer of the preset `thesis` with the quality of `high`, to 80 km, without a depth buffer, light of all orders.
+    /// The layer of the preset `thesis` with the quality of `high`, to 80 km, without a depth buffer or air, light of all orders.
     fn default() -> Self {
         CloudsOptions {
             quality: CloudQuality::of(&Preset::High),
             deck: CloudDeck::default(),
             far: 80_000.0,
             over_depth: false,
+            air: None,
             orders: Orders::All,
         }
     }
@@ -183,13 +207,22 @@ pub struct Clouds {
     tile: Tile,
     /// Light of many orders; none for single scattering.
     orders: Option<OrderTable>,
-    pipeline: wgpu::RenderPipeline,
+    /// For an eye within the air, and where air is shown for one above it.
+    pipelines: Vec<wgpu::RenderPipeline>,
+    /// Whether the eye is above the air.
+    outside: bool,
+    /// What lays a picture of half as many pixels a side over the host's.
+    half: Option<Half>,
     layouts: Vec<wgpu::BindGroupLayout>,
     view: wgpu::Buffer,
     view_group: wgpu::BindGroup,
     held: Vec<u8>,
     host: Option<wgpu::TextureView>,
     over_depth: bool,
+    /// Flags of the program for the air that is shown; none without.
+    air_features: Option<&'static [&'static str]>,
+    /// The tables of the sky, the colour of its sun and the thickness of the air (m).
+    air: Option<(wgpu::BindGroup, Vec3, f64)>,
     /// One for each tile.
     groups: Vec<wgpu::BindGroup>,
     /// Which tile is shown, and for which sun it was baked; none before the first.
@@ -203,6 +236,18 @@ pub struct Clouds {
     /// Fields of `CloudTile` for the last eye.
     placed: Option<[f32; 12]>,
     seen: bool,
+}
+
+/// What a layer in half as many pixels a side is laid over a picture with.
+#[derive(Debug)]
+struct Half {
+    pipeline: wgpu::RenderPipeline,
+    layouts: Vec<wgpu::BindGroupLayout>,
+    view_group: wgpu::BindGroup,
+    /// The layer, and what reads it; none before a size is told.
+    coarse: Option<(wgpu::TextureView, wgpu::BindGroup)>,
+    /// Pixels a side of the layer for each of the host's picture.
+    share: [f32; 2],
 }
 
 /// What a host's shader needs for the shadow of a layer: `cloud_shadow` of the module `veduta::clouds::tile`.
@@ -299,6 +344,12 @@ impl Clouds {
         if orders.is_some() {
             features.push("CLOUD_ORDERS");
         }
+        let air_features = options.air.as_ref().map(Atmosphere::features);
+        if let (Some(air), Some(own)) = (&options.air, air_features) {
+            air.check()?;
+            features.push("CLOUD_AIR");
+            features.extend(own);
+        }
         let over = wgpu::BlendComponent {
             src_factor: wgpu::BlendFactor::One,
             dst_factor: wgpu::BlendFactor::SrcAlpha,
@@ -309,12 +360,40 @@ impl Clouds {
             dst_factor: wgpu::BlendFactor::SrcAlpha,
             operation: wgpu::BlendOperation::Add,
         };
-        let ready = programs.get("cloud_layer", &features)?.pipeline(
-            device,
-            &PipelineOptions {
+        let program = programs.get("cloud_layer", &features)?;
+        // From above the air the clouds are drawn without it: llvmpipe 22.3 falls over the program for such an eye.
+        let bare: Vec<&str> = features
+            .iter()
+            .copied()
+            .filter(|f| !matches!(*f, "CLOUD_AIR" | "AIR_EIGHT_LANES"))
+            .collect();
+        let bare = programs.get("cloud_layer", &bare)?;
+        let laid_features: &[&str] = if options.over_depth {
+            &["CLOUD_UPSAMPLE", "CLOUD_OVER_DEPTH"]
+        } else {
+            &["CLOUD_UPSAMPLE"]
+        };
+        // The march, or what lays a coarse one over the picture.
+        let ready = |march: bool, outside: bool| {
+            let mut constants = Vec::new();
+            if march {
+                constants = vec![
+                    ("CLOUD_STEPS", f64::from(quality.steps)),
+                    ("CLOUD_MASK", f64::from(u8::from(quality.jitter))),
+                ];
+                if options.over_depth {
+                    constants.push(("CLOUD_HALF", f64::from(u8::from(quality.half))));
+                }
+            }
+            if march && air_features.is_some() && !outside {
+                constants.push(("EYE_PLACE", 0.0));
+            }
+            // A coarse picture holds nothing but the layer.
+            let coarse = march && quality.half;
+            let options = PipelineOptions {
                 targets: &[Some(wgpu::ColorTargetState {
-                    format: targets.color_format,
-                    blend: Some(wgpu::BlendState {
+                    format: if coarse { COARSE } else { targets.color_format },
+                    blend: (!coarse).then_some(wgpu::BlendState {
                         color: over,
                         alpha: keep,
                     }),
@@ -322,7 +401,7 @@ impl Clouds {
                 })],
                 depth_stencil: targets
                     .depth_format
-                    .filter(|_| !options.over_depth)
+                    .filter(|_| !options.over_depth && !coarse)
                     .map(|format| wgpu::DepthStencilState {
                         format,
                         depth_write_enabled: Some(false),
@@ -330,16 +409,30 @@ impl Clouds {
                         stencil: Default::default(),
                         bias: Default::default(),
                     }),
-                sample_count: targets.sample_count,
-                constants: &[("CLOUD_STEPS", f64::from(quality.steps))],
+                sample_count: if coarse { 1 } else { targets.sample_count },
+                constants: &constants,
                 ..Default::default()
-            },
-        )?;
-        let Pipeline::Render(pipeline) = ready.pipeline else {
-            return Err(Error::MissingStage {
-                program: "cloud_layer".to_owned(),
-            });
+            };
+            let ready = if march {
+                let program = if outside { bare } else { program };
+                program.pipeline(device, &options)?
+            } else {
+                programs
+                    .get("cloud_layer", laid_features)?
+                    .pipeline(device, &options)?
+            };
+            match ready.pipeline {
+                Pipeline::Render(pipeline) => Ok((pipeline, ready.bind_group_layouts)),
+                Pipeline::Compute(_) => Err(Error::MissingStage {
+                    program: "cloud_layer".to_owned(),
+                }),
+            }
         };
+        let (inside, layouts) = ready(true, false)?;
+        let mut pipelines = vec![inside];
+        if air_features.is_some() {
+            pipelines.push(ready(true, true)?.0);
+        }
         let view = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("veduta cloud view"),
             size: DrawBlock::SIZE as u64,
@@ -348,7 +441,7 @@ impl Clouds {
         });
         let view_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("veduta cloud view"),
-            layout: &ready.bind_group_layouts[0],
+            layout: &layouts[0],
             entries: &[
                 Some((0, &view)),
                 orders.as_ref().map(|table| (1, &table.weights)),
@@ -361,6 +454,25 @@ impl Clouds {
             })
             .collect::<Vec<_>>(),
         });
+        let half = if quality.half {
+            let (pipeline, layouts) = ready(false, false)?;
+            Some(Half {
+                view_group: device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some("veduta cloud view"),
+                    layout: &layouts[0],
+                    entries: &[wgpu::BindGroupEntry {
+                        binding: 0,
+                        resource: view.as_entire_binding(),
+                    }],
+                }),
+                pipeline,
+                layouts,
+                coarse: None,
+                share: [0.5; 2],
+            })
+        } else {
+            None
+        };
         let mut clouds = Clouds {
             deck: options.deck.clone(),
             quality,
@@ -368,13 +480,17 @@ impl Clouds {
             depth: targets.depth,
             tile,
             orders,
-            pipeline,
-            layouts: ready.bind_group_layouts,
+            pipelines,
+            outside: false,
+            half,
+            layouts,
             view,
             view_group,
             held: Vec::new(),
             host: None,
             over_depth: options.over_depth,
+            air_features,
+            air: None,
             groups: Vec::new(),
             shown: None,
             coming: None,
@@ -444,6 +560,101 @@ impl Clouds {
         }
         self.host = Some(depth.clone());
         self.bind(device);
+        if self.half.is_some() {
+            let texture = depth.texture();
+            self.set_size(device, [texture.width(), texture.height()])?;
+        }
+        Ok(())
+    }
+
+    /// Tells width and height of the host's picture to clouds of [`CloudQuality::half`]; [`Clouds::set_host`] does it by the depth buffer. Again after each change of size.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for clouds without `half`, and for a size that the device's textures cannot have.
+    pub fn set_size(&mut self, device: &wgpu::Device, size: [u32; 2]) -> Result<(), Error> {
+        let most = device.limits().max_texture_dimension_2d;
+        if !size.iter().all(|n| (1..=most).contains(n)) {
+            let domain = format!("each in [1, {most}] pixels");
+            return Err(fault("size", format!("{size:?}"), &domain));
+        }
+        let Some(half) = &mut self.half else {
+            let domain = "true for clouds that are told a size";
+            return Err(fault("quality.half", false, domain));
+        };
+        let target = device
+            .create_texture(&wgpu::TextureDescriptor {
+                label: Some("veduta coarse clouds"),
+                size: wgpu::Extent3d {
+                    width: size[0].div_ceil(2),
+                    height: size[1].div_ceil(2),
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: COARSE,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                    | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            })
+            .create_view(&Default::default());
+        let entries: Vec<_> = self
+            .host
+            .iter()
+            .map(|depth| (2, depth))
+            .chain([(4, &target)])
+            .map(|(binding, view)| wgpu::BindGroupEntry {
+                binding,
+                resource: wgpu::BindingResource::TextureView(view),
+            })
+            .collect();
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("veduta coarse clouds"),
+            layout: &half.layouts[1],
+            entries: &entries,
+        });
+        half.coarse = Some((target, group));
+        half.share = size.map(|n| n.div_ceil(2) as f32 / n as f32);
+        Ok(())
+    }
+
+    /// Tells the tables of the sky behind the clouds, from which the air before them is taken: up to the mean distance of what is seen of the clouds. Again after a change of
+    /// [`SkyTables::set_atmosphere`]. In every frame the sky's `prepare`, for the same view, comes before what is drawn here.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for clouds that were made without `air`, or for air that needs other programs; for tables without the air before things, which a sky as
+    /// [`Background`](crate::atmosphere::SkyComposition::Background) does not keep.
+    pub fn set_air(&mut self, device: &wgpu::Device, tables: &SkyTables) -> Result<(), Error> {
+        let Some(features) = self.air_features else {
+            let domain = "given for clouds that are told tables of the air";
+            return Err(fault("options.air", "none", domain));
+        };
+        tables
+            .atmosphere()
+            .check_features("tables.atmosphere", features)?;
+        let (Some(light), Some(depths)) = (tables.aerial(), tables.aerial_depths()) else {
+            let domain = "tables of a sky that is composed with the host's depth, or made by `SkyTables::new`";
+            return Err(fault("tables.aerial", "none", domain));
+        };
+        let resources = [
+            tables.air().as_entire_binding(),
+            tables.eye().as_entire_binding(),
+            wgpu::BindingResource::Sampler(tables.sampler()),
+            wgpu::BindingResource::TextureView(light),
+            wgpu::BindingResource::TextureView(depths),
+        ];
+        let entries: Vec<_> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("veduta air before clouds"),
+            layout: &self.layouts[2],
+            entries: &entries,
+        });
+        let colour = tables.atmosphere().sun.colour.map(|c| c as f32);
+        let thickness = tables.atmosphere().thickness;
+        self.air = Some((group, Vec3::from_array(colour), thickness));
         Ok(())
     }
 
@@ -470,18 +681,28 @@ impl Clouds {
         let orders = self.orders.as_ref().map(OrderTable::holds);
         let (textures, bytes, buffers, groups) = orders.unwrap_or_default();
         let more = u32::from(orders.is_some());
+        let air = u32::from(self.air.is_some());
+        let coarse = self.half.as_ref().and_then(|half| half.coarse.as_ref());
+        let laid = u32::from(self.half.is_some());
+        let held = u32::from(coarse.is_some());
+        let coarse_bytes = coarse.map_or(0, |(view, _)| {
+            8 * u64::from(view.texture().width()) * u64::from(view.texture().height())
+        });
         Resources {
-            pipelines: 2 + 5 * more,
-            bind_groups: parts + 2 + tiles + groups,
+            pipelines: 1 + self.pipelines.len() as u32 + 5 * more + laid,
+            bind_groups: parts + 2 + tiles + groups + air + laid + held,
             bindings: parts
                 + 2
                 + more
                 + (2 + more + u32::from(self.over_depth)) * tiles
-                + 2 * groups,
+                + 2 * groups
+                + 5 * air
+                + laid
+                + held * (1 + u32::from(self.over_depth)),
             buffers: parts + 2 + buffers,
             buffer_bytes: self.tile.buffer_bytes() + DrawBlock::SIZE as u64 + bytes,
-            textures: self.tile.views.len() as u32 + more,
-            texture_bytes: self.tile.texture_bytes() + textures,
+            textures: self.tile.views.len() as u32 + more + held,
+            texture_bytes: self.tile.texture_bytes() + textures + coarse_bytes,
             samplers: 1,
         }
     }
@@ -537,6 +758,8 @@ impl Clouds {
             let baked = (shown, sun.to_array());
             table.advance(queue, encoder, baked, fresh, swapped, &mut work);
         }
+        let top = self.air.as_ref().map_or(f64::INFINITY, |air| air.2);
+        self.outside = eye.altitude() > top;
         let sun = self.shown.map_or(to_sun, |s| s.1);
         let deck = &self.deck;
         let period = deck.period();
@@ -591,9 +814,24 @@ impl Clouds {
                 0.0
             },
             clear: deck.clear_way() as f32,
-            coarse: MINIFIED * self.tile.texels[self.shown.map_or(0, |s| s.0)] as f32
+            detail: MINIFIED * self.tile.texels[self.shown.map_or(0, |s| s.0)] as f32
                 / period as f32,
             least: self.tile.least,
+            // The same for one projection, and as good as any for each of those that frames are shifted by.
+            start: if self.quality.jitter {
+                let [x, y] = [view.projection.z_axis.x, view.projection.z_axis.y];
+                (12_345.68 * x + 7654.321 * y)
+                    .rem_euclid(1.0)
+                    .min(0.999_999)
+            } else {
+                0.0
+            },
+            coarse: self.half.as_ref().map_or([0.5; 2], |half| half.share),
+            air_light: self
+                .air
+                .as_ref()
+                .map_or(Vec3::ZERO, |(_, colour, _)| view.sun.irradiance * colour)
+                .to_array(),
             ..Default::default()
         };
         self.placed = Some([
@@ -607,7 +845,7 @@ impl Clouds {
             block.levels,
             block.extinction,
             block.clear,
-            block.coarse,
+            block.detail,
             block.least,
         ]);
         let bytes = block.to_bytes().to_vec();
@@ -713,15 +951,61 @@ impl Clouds {
         }
     }
 
+    /// Draws the layer in half as many pixels a side, for [`CloudQuality::half`]: after the host's things stand in the depth buffer, and before the pass of [`Clouds::composite`].
+    /// Nothing is done for other clouds.
+    ///
+    /// # Errors
+    /// As [`Clouds::composite`].
+    pub fn encode_volumes(&self, encoder: &mut wgpu::CommandEncoder) -> Result<Work, Error> {
+        let Some(half) = self.half.as_ref().filter(|_| self.seen) else {
+            return Ok(Work::default());
+        };
+        let Some((target, _)) = &half.coarse else {
+            return Err(fault("size", "none", "told with `set_size` or `set_host`"));
+        };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("veduta coarse clouds"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            ..Default::default()
+        });
+        self.march(&mut pass)
+    }
+
     /// Lays the clouds over what the pass holds: radiance times transmittance, plus light. Clouds over a depth buffer must be drawn in a pass that does not
     /// write it.
     ///
     /// # Errors
-    /// [`Error::OutOfDomain`] when a depth buffer is needed and [`Clouds::set_host`] has told none.
+    /// [`Error::OutOfDomain`] when a depth buffer is needed and [`Clouds::set_host`] has told none, or tables of the air and [`Clouds::set_air`] has told none.
     pub fn composite(&self, pass: &mut wgpu::RenderPass<'_>) -> Result<Work, Error> {
         if !self.seen {
             return Ok(Work::default());
         }
+        let Some(half) = &self.half else {
+            return self.march(pass);
+        };
+        let Some((_, coarse)) = &half.coarse else {
+            return Err(fault("size", "none", "told with `set_size` or `set_host`"));
+        };
+        pass.set_pipeline(&half.pipeline);
+        pass.set_bind_group(0, &half.view_group, &[]);
+        pass.set_bind_group(1, coarse, &[]);
+        pass.draw(0..3, 0..1);
+        Ok(Work {
+            draws: 1,
+            ..Work::default()
+        })
+    }
+
+    /// Draws the march.
+    fn march(&self, pass: &mut wgpu::RenderPass<'_>) -> Result<Work, Error> {
         let shown = self.shown.map_or(0, |s| s.0);
         let Some(group) = self.groups.get(shown) else {
             return Err(fault(
@@ -730,9 +1014,16 @@ impl Clouds {
                 "a depth buffer, told with `set_host`",
             ));
         };
-        pass.set_pipeline(&self.pipeline);
+        if self.air_features.is_some() && self.air.is_none() {
+            let domain = "tables of the sky, told with `set_air`";
+            return Err(fault("air", "none", domain));
+        }
+        pass.set_pipeline(&self.pipelines[usize::from(self.outside)]);
         pass.set_bind_group(0, &self.view_group, &[]);
         pass.set_bind_group(1, group, &[]);
+        if let Some((air, ..)) = self.air.as_ref().filter(|_| !self.outside) {
+            pass.set_bind_group(2, air, &[]);
+        }
         pass.draw(0..3, 0..1);
         Ok(Work {
             draws: 1,

@@ -236,7 +236,7 @@ impl GroundPicture {
             surface_pipeline(
                 device,
                 programs,
-                "ground_picture",
+                ("ground_picture", &[]),
                 targets,
                 depth_format,
                 &[("OUTPUT", output), ("GROUND_LAYER", number)],

@@ -37,6 +37,20 @@ pub fn bayer_8x8(pixel: [u32; 2]) -> f64 {
     (f64::from(rank(pixel[0] % 8, pixel[1] % 8, 8)) + 0.5) / 64.0
 }
 
+/// Multiples of 1 / p and 1 / p^2, with the plastic number p, without their whole part, folded at a half; rounded down to 24 bits.
+pub fn blue_mask(pixel: [u32; 2]) -> f64 {
+    let steps = [0.754_877_666_246_692_7_f64, 0.569_840_290_998_053_3];
+    let turns = |k: usize| u64::from(pixel[k]) * (steps[k] * 2_f64.powi(32)).round() as u64;
+    let share = ((turns(0) + turns(1)) % (1 << 32)) as f64;
+    let top = 2_f64.powi(32);
+    let folded = if share >= 0.5 * top {
+        top - 1.0 - share
+    } else {
+        share
+    };
+    (folded / 128.0).floor() / 2_f64.powi(24)
+}
+
 /// A signal shifted by less than half an output step.
 pub fn dither(encoded: [f64; 3], pixel: [u32; 2], levels: f64) -> [f64; 3] {
     encoded.map(|c| c + (bayer_8x8(pixel) - 0.5) / levels)

@@ -83,7 +83,7 @@ impl GlobeTerrain {
         let (pipeline, layouts) = surface_pipeline(
             device,
             programs,
-            "terrain_globe",
+            ("terrain_globe", &[]),
             targets,
             format,
             &constants,

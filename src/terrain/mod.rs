@@ -3,6 +3,7 @@
 
 mod calibrate;
 mod clipmap;
+mod cloud_shade;
 mod field;
 mod globe;
 mod globe_rays;

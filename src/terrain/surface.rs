@@ -3,6 +3,7 @@
 use super::clipmap::Clipmap;
 use super::globe_system::{GlobeTerrain, LIGHTS, cosine};
 use super::system::{PlaneTerrain, TerrainLights, TerrainOptions};
+use crate::clouds::CloudShadow;
 use crate::error::Error;
 use crate::landscape::{Resources, Targets, Work};
 use crate::program::ProgramSet;
@@ -116,6 +117,23 @@ impl Terrain {
             sphere.set_lights(lights.map(<[_]>::to_vec));
         }
         Ok(())
+    }
+
+    /// Tells the shadow of a layer of clouds, by which the sun's light is less from the next [`Terrain::draw_opaque`] on; `None` where there is none. In every frame between
+    /// [`Clouds::prepare`](crate::clouds::Clouds::prepare) for the same eye and the submission, since places are relative to the eye. The light of the sky stays as it is given.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for ground that was made without `cloud_shadows`; nothing happens over a ball.
+    pub fn set_cloud_shadow(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        shadow: Option<&CloudShadow<'_>>,
+    ) -> Result<Work, Error> {
+        match &mut self.ground {
+            Ground::Plane(plane) => plane.set_cloud_shadow(device, queue, shadow),
+            Ground::Sphere(_) => Ok(Work::default()),
+        }
     }
 
     /// Uploads what has changed, and records the baking of the ground that the eye has uncovered. `rows` is the height of the target in pixels, from which

@@ -3,8 +3,10 @@
 use glam::Vec3;
 
 use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group, nearest_ground};
+use super::cloud_shade::CloudShade;
 use super::ground::Prepared;
 use super::land::Land;
+use crate::clouds::CloudShadow;
 use crate::error::Error;
 use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
 use crate::program::{Pipeline, PipelineOptions, ProgramSet};
@@ -73,6 +75,8 @@ pub struct TerrainOptions {
     /// Texels of a side of each level of baked heights: 128, 256, 512 or 1024. A texel is about as wide as a pixel where it is used when this is 3.5 over the angle of a pixel. 0 leaves it to the
     /// preset's CLIP_TEXELS: 512, or 256 for `low`. Nothing comes of it over a ball, where nothing is baked.
     pub texels: u32,
+    /// Whether a layer of clouds shades the ground, which [`Terrain::set_cloud_shadow`](super::Terrain::set_cloud_shadow) tells. Nothing comes of it over a ball.
+    pub cloud_shadows: bool,
 }
 
 impl Default for TerrainOptions {
@@ -84,6 +88,7 @@ impl Default for TerrainOptions {
             far: 60_000.0,
             sky_sectors: 0,
             texels: 0,
+            cloud_shadows: false,
         }
     }
 }
@@ -101,6 +106,8 @@ pub(super) struct PlaneTerrain {
     field: wgpu::Buffer,
     rock: wgpu::Buffer,
     held: [Vec<u8>; 3],
+    /// What the program reads of clouds.
+    shade: Option<CloudShade>,
     /// Whether the view shows any ground.
     seen: bool,
 }
@@ -109,12 +116,12 @@ pub(super) struct PlaneTerrain {
 pub(crate) fn surface_pipeline(
     device: &wgpu::Device,
     programs: &ProgramSet,
-    program: &str,
+    (program, features): (&str, &[&str]),
     targets: &Targets,
     depth_format: wgpu::TextureFormat,
     constants: &[(&str, f64)],
 ) -> Result<(wgpu::RenderPipeline, Vec<wgpu::BindGroupLayout>), Error> {
-    let ready = programs.get(program, &[])?.pipeline(
+    let ready = programs.get(program, features)?.pipeline(
         device,
         &PipelineOptions {
             targets: &[Some(targets.color_format.into())],
@@ -294,7 +301,14 @@ impl PlaneTerrain {
         let (pipeline, layouts) = surface_pipeline(
             device,
             programs,
-            "terrain",
+            (
+                "terrain",
+                if options.cloud_shadows {
+                    &["CLOUD_SHADOWS"]
+                } else {
+                    &[]
+                },
+            ),
             targets,
             depth_format,
             &constants,
@@ -338,6 +352,10 @@ impl PlaneTerrain {
                 ],
             ),
         ];
+        let shade = layouts
+            .get(2)
+            .filter(|_| options.cloud_shadows)
+            .map(|layout| CloudShade::new(device, layout));
         Ok(PlaneTerrain {
             clipmap,
             land: options.land.clone(),
@@ -349,6 +367,7 @@ impl PlaneTerrain {
             field,
             rock,
             held: Default::default(),
+            shade,
             seen: true,
         })
     }
@@ -361,15 +380,41 @@ impl PlaneTerrain {
     /// What it keeps on the device.
     pub fn resources(&self) -> Resources {
         let clipmap = self.clipmap.resources();
+        let shade = u32::from(self.shade.is_some());
         Resources {
             pipelines: clipmap.pipelines + 1,
-            bind_groups: clipmap.bind_groups + 2,
-            bindings: clipmap.bindings + 11,
-            buffers: clipmap.buffers + 3,
+            bind_groups: clipmap.bind_groups + 2 + shade,
+            bindings: clipmap.bindings + 11 + 3 * shade,
+            buffers: clipmap.buffers + 3 + shade,
             buffer_bytes: clipmap.buffer_bytes
-                + (ViewBlock::SIZE + FieldBlock::SIZE + RockBlock::SIZE) as u64,
-            ..clipmap
+                + (ViewBlock::SIZE + FieldBlock::SIZE + RockBlock::SIZE) as u64
+                + u64::from(40 * shade),
+            textures: clipmap.textures + shade,
+            texture_bytes: clipmap.texture_bytes + u64::from(4 * shade),
+            samplers: clipmap.samplers + shade,
         }
+    }
+
+    /// Takes the shadow of clouds for the next frame.
+    pub fn set_cloud_shadow(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        shadow: Option<&CloudShadow<'_>>,
+    ) -> Result<Work, Error> {
+        let Some(shade) = &mut self.shade else {
+            return Err(Error::OutOfDomain {
+                name: "terrain.cloud_shadows".to_owned(),
+                value: "false".to_owned(),
+                domain: "true for ground that is told a shadow".to_owned(),
+            });
+        };
+        let writes = shade.set(device, queue, shadow);
+        Ok(Work {
+            writes,
+            bytes: u64::from(40 * writes),
+            ..Work::default()
+        })
     }
 
     /// Uploads what has changed, and records the baking of the ground that the eye has uncovered. `rows` is the height of the target in pixels, from which
@@ -500,7 +545,8 @@ impl PlaneTerrain {
             return Work::default();
         }
         pass.set_pipeline(&self.pipeline);
-        for (index, group) in (0..).zip(&self.groups) {
+        let shade = self.shade.iter().map(|shade| &shade.group);
+        for (index, group) in (0..).zip(self.groups.iter().chain(shade)) {
             pass.set_bind_group(index, group, &[]);
         }
         pass.draw(0..COLUMNS * 6, 0..1);

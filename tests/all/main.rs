@@ -3,6 +3,7 @@
 mod accuracy;
 mod air;
 mod atmosphere;
+mod cloud_frames;
 mod clouds;
 mod common;
 mod cubes;

@@ -405,3 +405,59 @@ fn dithering_keeps_the_mean_and_uses_every_threshold_once() {
         );
     }
 }
+
+/// The mask is even over any patch, and has hardly anything of coarse grain: its power below an eighth of a cycle a pixel, beside that of white noise.
+#[test]
+fn the_blue_mask_has_no_coarse_grain() {
+    let pixels: Vec<[u32; 2]> = (0..64)
+        .flat_map(|y| (0..64).map(move |x| [x + 300, y + 4000]))
+        .collect();
+    let values = evaluator(
+        &["veduta::post::dither::{blue_mask}"],
+        "",
+        "blue_mask(vec2u(in.u[0], in.u[1]))",
+        2,
+    )
+    .run(&pixels.concat())
+    .unwrap();
+    let truth: Vec<f64> = pixels.iter().map(|p| post::blue_mask(*p)).collect();
+    assert_promise("post/dither", "blue_mask", &values, &truth);
+    let mut tenths = [0; 10];
+    for v in &values {
+        tenths[(10.0 * v) as usize] += 1;
+    }
+    println!("{tenths:?}");
+    assert!(tenths.iter().all(|n| (389..=430).contains(n)));
+    let coarse = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / 4096.0;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 4096.0;
+        let (mut power, mut count) = (0.0, 0);
+        for (u, v) in (0..=8_i32).flat_map(|u| (-8..=8_i32).map(move |v| (u, v))) {
+            if (u, v) == (0, 0) || u * u + v * v > 64 {
+                continue;
+            }
+            let (mut re, mut im) = (0.0, 0.0);
+            for (k, value) in values.iter().enumerate() {
+                let at = f64::from(u * (k as i32 % 64) + v * (k as i32 / 64)) / 64.0;
+                let (sin, cos) = (std::f64::consts::TAU * at).sin_cos();
+                re += (value - mean) * cos;
+                im += (value - mean) * sin;
+            }
+            power += (re * re + im * im) / 4096.0;
+            count += 1;
+        }
+        power / f64::from(count) / variance
+    };
+    let mut state = 1_u64;
+    let white: Vec<f64> = (0..4096)
+        .map(|_| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 33) as f64 / 2_f64.powi(31)
+        })
+        .collect();
+    let (mask, noise) = (coarse(&values), coarse(&white));
+    println!("power of coarse grain, of white noise 1: mask {mask:.3}, noise {noise:.3}");
+    assert!(mask < 0.15 && noise > 0.7, "{mask} {noise}");
+}

@@ -163,10 +163,8 @@ fn sky_place_shown(eye: SkyEye, dir: vec3<f32>) -> SkyPlace {
     let flat = inverseSqrt(max(dot(eye.to_sun.xz, eye.to_sun.xz), 1e-20));
     let azimuth = clamp(dot(dir.xz, eye.to_sun.xz) * (over * flat), -1.0, 1.0);
     let share = max(1.0 - min(ratio, 1.0 / ratio), 0.0);
-    var y = sqrt(share);
-    if sky_coded(eye) && ratio <= 1.0 {
-        y = bend_limb(share, inner_bend(eye));
-    }
+    // Not by a branch: llvmpipe 22.3 falls over uniforms that it puts into conditions, in programs that are as long as that of clouds with air.
+    let y = select(sqrt(share), bend_limb(share, inner_bend(eye)), sky_coded(eye) & (ratio <= 1.0));
     return SkyPlace(0.5 - 0.5 * azimuth, y, ratio > 1.0, clamp(dot(dir, eye.to_sun), -1.0, 1.0), 1.0);
 }
 

@@ -75,6 +75,8 @@ struct OrderedLight {
     transmittance: f32,
     /// Transmittance where the peak takes nothing away.
     kept_transmittance: f32,
+    /// Mean distance of what is seen of the clouds [m], by what each stretch takes of that transmittance; the layer's entry where there are none.
+    mean_distance: f32,
 }
 
 /// What the cells of a layer scatter at a point given relative to the eye, towards a view whose cosine to the sun is `nu`: of the sun's light for an
@@ -139,8 +141,8 @@ fn path_altitude(path: TilePath, distance: f32) -> f32 {
 }
 
 /// Light of all orders of the cloud layer along a view ray up to `max_distance`, stepped as [`march_tile`] is, with a fetch more a step. The phase function is one
-/// part that turns light and a peak that hardly does; `kept` is what is left of the extinction without the peak, `nu` the cosine between view and sun.
-/// Ends when less than `min_transmittance` is left without the peak.
+/// part that turns light and a peak that hardly does; `kept` is what is left of the extinction without the peak, `nu` the cosine between view and sun; the
+/// first step is shorter by `start`, a share of it. Ends when less than `min_transmittance` is left without the peak.
 ///
 /// domain  kept in [0.001, 1] 1 lin
 /// domain  nu in [-1, 1] 1 lin
@@ -150,12 +152,13 @@ fn path_altitude(path: TilePath, distance: f32) -> f32 {
 /// domain  max_distance in [0, 1e5] m lin
 /// domain  min_transmittance in [0, 0.1] 1 lin
 /// domain  steps in [1, 512] 1 lin
+/// domain  start in [0, 1] 1 lin
 /// range   [0, 1e6] 1
 /// error   1e-1 rel of reference::volume::layer_light
 /// outside undefined
 /// source  ours
 fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: sampler, layer: CloudTile, kept: f32, nu: f32, ground_radius: f32, eye_altitude: f32,
-    dir: vec3<f32>, max_distance: f32, min_transmittance: f32, steps: i32) -> OrderedLight {
+    dir: vec3<f32>, max_distance: f32, min_transmittance: f32, steps: i32, start: f32) -> OrderedLight {
     let path = tile_path(layer, ground_radius, eye_altitude, dir, max_distance, steps);
     let deepest = -log(max(min_transmittance, 1e-20)) / max(kept, 1e-3);
     var t = segment_distance(path.segment, 0.0);
@@ -166,9 +169,13 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
     var left = 1.0;
     var once = vec2<f32>(0.0);
     var sent = vec3<f32>(0.0);
+    var weighted = 0.0;
     var s = 0.0;
-    for (var i = 0; i < path.count && s < path.size && depth < deepest; i++) {
-        s = min(s + max(path.even * (2.0 - left), -layer.clear * here.x), path.size);
+    var stride = 1.0 - start;
+    let most = path.count + select(0, 1, start > 0.0);
+    for (var i = 0; i < most && s < path.size && depth < deepest; i++) {
+        s = min(s + stride * max(path.even * (2.0 - left), -layer.clear * here.x), path.size);
+        stride = 1.0;
         let at = segment_distance(path.segment, s);
         let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at), at);
         let added = mean_density(here.x, next.x) * layer.extinction * (at - t);
@@ -181,19 +188,21 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
         let through = exp(-kept * depth);
         let half_way = 0.5 * (at + t);
         sent += (left - through) * cells_at(cells, linear, layer, dir.xz * half_way, path_altitude(path, half_way), nu);
+        weighted += (left - through) * half_way;
         left = through;
         lit = dim;
         reach = ahead;
         here = next;
         t = at;
     }
-    return OrderedLight(once.x, once.y, sent, exp(-depth), left);
+    let weight = 1.0 - left;
+    return OrderedLight(once.x, once.y, sent, exp(-depth), left, select(path.segment.near, weighted / max(weight, 1e-12), weight > 1e-6));
 }
 
 /// Light of the cloud layer along a view ray up to `max_distance`, in steps of one fetch, for an albedo and a phase function of 1. `steps` are those of a
 /// ray that is eight times as long in the layer as the layer is thick; a longer ray takes more, a shorter one less, by the root of its length. Steps grow
-/// where the tile says that no cloud is near, and to twice as long as less light is left. Light and depth of a step are exact where its extinction is even and the depth to the sun changes
-/// evenly. Ends when less than `min_transmittance` is left.
+/// where the tile says that no cloud is near, and to twice as long as less light is left. Light and depth of a step are exact where its extinction is even and
+/// the depth to the sun changes evenly. The first step is shorter by `start`, a share of it, for a jitter. Ends when less than `min_transmittance` is left.
 ///
 /// domain  ground_radius in [3e6, 1e8] m log
 /// domain  eye_altitude in [0, 1e5] m lin
@@ -201,12 +210,13 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
 /// domain  max_distance in [0, 1e5] m lin
 /// domain  min_transmittance in [0, 0.1] 1 lin
 /// domain  steps in [1, 512] 1 lin
+/// domain  start in [0, 1] 1 lin
 /// range   [0, 1e6] 1
 /// error   2e-2 abs of reference::clouds::march_clouds
 /// outside undefined
 /// source  ours
 fn march_tile(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, ground_radius: f32, eye_altitude: f32, dir: vec3<f32>, max_distance: f32,
-    min_transmittance: f32, steps: i32) -> CloudLight {
+    min_transmittance: f32, steps: i32, start: f32) -> CloudLight {
     let path = tile_path(layer, ground_radius, eye_altitude, dir, max_distance, steps);
     let deepest = -log(max(min_transmittance, 1e-20));
     var t = segment_distance(path.segment, 0.0);
@@ -219,8 +229,11 @@ fn march_tile(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, ground_r
     var weighted = 0.0;
     var samples = 0;
     var s = 0.0;
-    for (var i = 0; i < path.count && s < path.size && depth < deepest; i++) {
-        s = min(s + max(path.even * (2.0 - left), -layer.clear * here.x), path.size);
+    var stride = 1.0 - start;
+    let most = path.count + select(0, 1, start > 0.0);
+    for (var i = 0; i < most && s < path.size && depth < deepest; i++) {
+        s = min(s + stride * max(path.even * (2.0 - left), -layer.clear * here.x), path.size);
+        stride = 1.0;
         let at = segment_distance(path.segment, s);
         let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at), at);
         let added = mean_density(here.x, next.x) * layer.extinction * (at - t);

@@ -1,4 +1,4 @@
-A cloud layer over a host's picture, from its tile: radiance, and transmittance in alpha.
+A cloud layer over a host's picture, from its tile: radiance, and transmittance in alpha. With CLOUD_UPSAMPLE from a picture of half as many pixels a side.
 
 #PROGRAM{ cloud_layer }#
 
@@ -45,9 +45,15 @@ struct CloudDraw {
     // Way that is free of clouds for each unit that the tile's density is below 0 [m].
     clear: f32,
     // Levels of detail: texels a metre, times their share of a pixel.
-    coarse: f32,
+    detail: f32,
     // The least density that the tile tells.
     least: f32,
+    // Irradiance of the sun at the top of the air that is seen before the clouds.
+    air_light: vec3<f32>,
+    // What all marches start farther by with CLOUD_MASK, a share of a step.
+    start: f32,
+    // Pixels a side of a coarse picture of the layer for each of the host's.
+    coarse: vec2<f32>,
 }
 
 @group(0) @binding(0) var<uniform> draw_view: CloudDraw;
@@ -67,6 +73,8 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 
 #FRAGMENT{
     #CODE{
+#ifndef CLOUD_UPSAMPLE
+#import veduta::post::dither::{blue_mask}
 #ifdef CLOUD_ORDERS
 #import veduta::clouds::tile::{CloudTile, march_tile_orders}
 #else
@@ -74,14 +82,64 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::lighting::phase::{phase_double_henyey_greenstein}
 #endif
 #import veduta::planet::shell::{ground_distance}
+#ifdef CLOUD_AIR
+#import veduta::atmosphere::medium::{Air}
+#import veduta::atmosphere::sky_view::{SkyEye, sky_place_shown, sky_place_outside}
+#import veduta::atmosphere::ray::{AirLight, air_ray}
+#import veduta::atmosphere::aerial::{aerial_light}
+#endif
+#endif
     }#
     #USE{ VARYING }#
     #CODE{
-@group(1) @binding(0) var linear: sampler;
-@group(1) @binding(1) var tile: texture_3d<f32>;
 #ifdef CLOUD_OVER_DEPTH
 @group(1) @binding(2) var host_depth: texture_depth_2d;
+
+// The texel of the host's depth that stands for four of them, in turns another one of the four.
+fn stands_for(texel: vec2<i32>) -> vec2<i32> {
+    return min(2 * texel + vec2<i32>(texel.y & 1, texel.x & 1), vec2<i32>(textureDimensions(host_depth)) - 1);
+}
 #endif
+#ifdef CLOUD_UPSAMPLE
+// The layer in half as many pixels a side.
+@group(1) @binding(4) var coarse: texture_2d<f32>;
+
+#ifdef CLOUD_OVER_DEPTH
+// One over the linear depth.
+fn nearness(texel: vec2<i32>) -> f32 {
+    return (textureLoad(host_depth, texel, 0) + draw_view.depth_offset) / draw_view.depth_numerator;
+}
+#endif
+
+// The mean of four pixels around, by their distance and by whether their rays end as far away.
+@fragment
+fn draw(in: Corner) -> @location(0) vec4<f32> {
+    let last = vec2<i32>(textureDimensions(coarse)) - 1;
+    let at = draw_view.coarse * in.position.xy - 0.5;
+    let low = floor(at);
+    let share = at - low;
+    var sum = vec4<f32>(0.0);
+    var total = 0.0;
+#ifdef CLOUD_OVER_DEPTH
+    let own = nearness(vec2<i32>(in.position.xy));
+#endif
+    for (var k = 0; k < 4; k++) {
+        let right = (k & 1) == 1;
+        let down = k >= 2;
+        let texel = clamp(vec2<i32>(low) + vec2<i32>(k & 1, k >> 1u), vec2<i32>(0), last);
+        var weight = select(1.0 - share.x, share.x, right) * select(1.0 - share.y, share.y, down);
+#ifdef CLOUD_OVER_DEPTH
+        let there = nearness(stands_for(texel));
+        weight *= max(1.0 - 8.0 * abs(there - own) / max(max(there, own), 1e-12), 1e-4);
+#endif
+        sum += weight * textureLoad(coarse, texel, 0);
+        total += weight;
+    }
+    return sum / total;
+}
+#else
+@group(1) @binding(0) var linear: sampler;
+@group(1) @binding(1) var tile: texture_3d<f32>;
 #ifdef CLOUD_ORDERS
 @group(1) @binding(3) var cells: texture_3d<f32>;
 
@@ -99,6 +157,43 @@ fn weight_at(i: i32) -> vec2<f32> {
 #endif
 
 override CLOUD_STEPS: i32 = 64;
+// Whether half as many pixels a side are drawn as the host's picture has.
+override CLOUD_HALF: i32 = 0;
+// Whether marches start at places that a mask shifts.
+override CLOUD_MASK: i32 = 0;
+
+#ifdef CLOUD_AIR
+// Where the eye is: above the air with 2.
+override EYE_PLACE: i32 = 0;
+
+// Air, eye and tables of the sky behind the clouds.
+@group(2) @binding(0) var<uniform> air: Air;
+@group(2) @binding(1) var<uniform> eye: SkyEye;
+@group(2) @binding(2) var clamped: sampler;
+@group(2) @binding(3) var air_table: texture_2d_array<f32>;
+@group(2) @binding(4) var air_depths: texture_2d<f32>;
+
+// Light and transmittance of the air up to a distance.
+fn air_before(dir: vec3<f32>, distance: f32) -> AirLight {
+    var place = sky_place_shown(eye, dir);
+    if EYE_PLACE == 2 {
+        place = sky_place_outside(eye, dir);
+    }
+    let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
+    return aerial_light(air_table, air_depths, clamped, air, eye, place, distance - ray.from_eye, ray.length);
+}
+#endif
+
+// What is blended over the picture: light of clouds, behind the air, and transmittance.
+fn laid(dir: vec3<f32>, light: vec3<f32>, transmittance: f32, mean_distance: f32) -> vec4<f32> {
+#ifdef CLOUD_AIR
+    // The picture has the air before it in it, of which clouds hide what lies behind them.
+    let front = air_before(dir, mean_distance);
+    return vec4<f32>(front.transmittance * light + (1.0 - transmittance) * front.in_scatter * draw_view.air_light, transmittance);
+#else
+    return vec4<f32>(light, transmittance);
+#endif
+}
 
 @fragment
 fn draw(in: Corner) -> @location(0) vec4<f32> {
@@ -107,28 +202,31 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     let ground = ground_distance(draw_view.ground_radius, altitude, dir.y);
     var far = select(draw_view.far, min(draw_view.far, ground), ground >= 0.0);
 #ifdef CLOUD_OVER_DEPTH
-    let depth = textureLoad(host_depth, vec2<i32>(in.position.xy), 0);
+    let texel = vec2<i32>(in.position.xy);
+    let depth = textureLoad(host_depth, select(texel, stands_for(texel), CLOUD_HALF != 0), 0);
     let linear_depth = draw_view.depth_numerator / (depth + draw_view.depth_offset);
     let reached = linear_depth / max(dot(dir, draw_view.forward), 1e-4);
     far = select(min(far, max(reached, 0.0)), far, depth == draw_view.sky_depth || reached > 1e8);
 #endif
-    let layer = CloudTile(draw_view.place, draw_view.shear, draw_view.tiles_per_metre, draw_view.bottom, draw_view.thickness, draw_view.levels, draw_view.extinction, draw_view.clear, draw_view.coarse * max(length(dpdx(dir)), length(dpdy(dir))), draw_view.least);
+    let layer = CloudTile(draw_view.place, draw_view.shear, draw_view.tiles_per_metre, draw_view.bottom, draw_view.thickness, draw_view.levels, draw_view.extinction, draw_view.clear, draw_view.detail * max(length(dpdx(dir)), length(dpdy(dir))), draw_view.least);
     let nu = clamp(dot(dir, draw_view.to_sun), -1.0, 1.0);
+    let start = select(0.0, fract(blue_mask(vec2<u32>(in.position.xy)) + draw_view.start), CLOUD_MASK != 0);
 #ifdef CLOUD_ORDERS
-    let light = march_tile_orders(tile, cells, linear, layer, draw_view.kept, nu, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS);
+    let light = march_tile_orders(tile, cells, linear, layer, draw_view.kept, nu, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS, start);
     let x = clamp(sqrt(acos(nu) * 0.31830989), 0.0, 1.0) * 127.0;
     let i = min(i32(x), 126);
     let weight = mix(weight_at(i), weight_at(i + 1), x - f32(i));
     let sun = max(weight.x * light.whole + weight.y * light.kept, 0.0) + light.before.x;
-    // What the peak scatters of the light behind.
-    let behind = select(draw_view.above, draw_view.below, ground >= 0.0 || dir.y < 0.0) * (light.kept_transmittance - light.transmittance);
+    // What the peak scatters of the light behind; about the eye's level of both, or there were a line.
+    let behind = mix(draw_view.below, draw_view.above, smoothstep(-0.15, 0.15, dir.y)) * (light.kept_transmittance - light.transmittance);
     let around = draw_view.above * light.before.y + draw_view.below * light.before.z + behind;
-    return vec4<f32>(sun * draw_view.sun_light + around, light.transmittance);
+    return laid(dir, sun * draw_view.sun_light + around, light.transmittance, light.mean_distance);
 #else
-    let light = march_tile(tile, linear, layer, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS);
+    let light = march_tile(tile, linear, layer, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS, start);
     let phase = phase_double_henyey_greenstein(nu, draw_view.g_forward, draw_view.g_backward, draw_view.backward_share);
-    return vec4<f32>(light.scatter * phase * draw_view.sun_light + (1.0 - light.transmittance) * draw_view.above, light.transmittance);
+    return laid(dir, light.scatter * phase * draw_view.sun_light + (1.0 - light.transmittance) * draw_view.above, light.transmittance, light.mean_distance);
 #endif
 }
+#endif
     }#
 }#

@@ -133,7 +133,7 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     let phase = probe.albedo * phase_double_henyey_greenstein(nu, probe.g_forward, probe.g_backward, probe.backward_share);
 #ifdef CLOUD_TILE
     let layer = CloudTile(vec2<f32>(0.0), probe.shear, 1.0 / probe.edge, probe.bottom, probe.thickness, probe.levels, probe.extinction, 0.0, 0.0, probe.least);
-    let light = march_tile(tile, linear, layer, probe.ground_radius, ray.altitude, dir, far, 1e-6, 2048);
+    let light = march_tile(tile, linear, layer, probe.ground_radius, ray.altitude, dir, far, 1e-6, 2048, 0.0);
     let at = altitude_along(probe.ground_radius, ray.altitude, dir.y, light.mean_distance);
     let mu = direction_cosine_along(probe.ground_radius, ray.altitude, at, probe.to_sun.y, nu, light.mean_distance);
     let lit = ground_distance(probe.ground_radius, at, mu) < 0.0;

@@ -123,6 +123,9 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::terrain::material::{Rock, faded_noise, rock_low_faded, rock_high_faded, snow_blend}
 #import veduta::terrain::shading::{ThreeLights, shade_rough}
 #import veduta::terrain::sky_share::{sky_share}
+#ifdef CLOUD_SHADOWS
+#import veduta::clouds::tile::{CloudTile, cloud_shadow}
+#endif
 #import veduta::tone_map::exponential::{exponential}
 #import veduta::post::srgb::{encode_srgb, decode_srgb}
 #import veduta::post::dither::{dither}
@@ -139,6 +142,11 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 @group(1) @binding(3) var shades: texture_2d_array<f32>;
 @group(1) @binding(4) var wrapping: sampler;
 @group(1) @binding(5) var relief: texture_2d<f32>;
+#ifdef CLOUD_SHADOWS
+@group(2) @binding(0) var<uniform> cloud_layer: CloudTile;
+@group(2) @binding(1) var cloud_sampler: sampler;
+@group(2) @binding(2) var cloud_tile: texture_3d<f32>;
+#endif
 
 override FIELD_KIND: i32 = 2;
 override OUTPUT: i32 = 0;
@@ -186,7 +194,10 @@ fn draw(in: Corner) -> Shown {
     let footprint = select(1e30, angle * found.distance / max(-dot(normal, dir), 0.05), is_met);
     let ground = land_at(relief, field, FIELD_KIND, point.xz, footprint);
     let altitude = altitude_of(clip.ground_radius, clip.eye_altitude, point);
-    let light = sun_share(heights, shades, wrapping, places, clip, sweep, point.xz);
+    var light = sun_share(heights, shades, wrapping, places, clip, sweep, point.xz);
+#ifdef CLOUD_SHADOWS
+    light *= cloud_shadow(cloud_tile, cloud_sampler, cloud_layer, point.xz, altitude);
+#endif
     let place = vec3<f32>(point.x, altitude, point.z);
     var albedo = vec3<f32>(0.0);
     if ROCK_CHEAP != 0 {

@@ -41,6 +41,15 @@ const FINENESS: [(u32, u32, u32, bool); 16] = [
     (512, 128, 256, true),
 ];
 
+/// Steps, and whether with half resolution and shifted starts.
+const OPTIONS: [(u32, bool, bool); 5] = [
+    (96, false, false),
+    (96, true, false),
+    (32, false, false),
+    (32, false, true),
+    (48, true, true),
+];
+
 /// Frames of the sun that moves, and degrees a frame: one a second at 30 frames a second.
 const FRAMES: usize = 72;
 const TURN: f64 = 1.0 / 30.0;
@@ -67,6 +76,8 @@ pub struct Report {
     pub skipping: Vec<Point>,
     /// The system under a sun that stands.
     pub system: Vec<Point>,
+    /// The same with options.
+    pub options: Vec<Point>,
     /// The first frame with the quality of `high` and a first tile of 256, bake included.
     pub first: Point,
     /// Frames of a sun that moves, bakes included: mean time, and the least PSNR.
@@ -105,6 +116,7 @@ impl Canvas<'_> {
         spent(|| {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let _ = clouds.prepare(&gpu.queue, &mut encoder, view, &lights)?;
+            let _ = clouds.encode_volumes(&mut encoder)?;
             {
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -234,7 +246,11 @@ pub fn run(
             orders: veduta::clouds::Orders::Single,
             ..Default::default()
         };
-        Clouds::new(&gpu.device, programs, &targets, &options)
+        let mut clouds = Clouds::new(&gpu.device, programs, &targets, &options)?;
+        if quality.half {
+            clouds.set_size(&gpu.device, [size.width, size.height])?;
+        }
+        Ok::<Clouds, CliError>(clouds)
     };
     let fine = CloudQuality {
         texels: 512,
@@ -242,19 +258,43 @@ pub fn run(
         frames: 1,
         ..CloudQuality::of(&Preset::High)
     };
-    let mut points = Vec::new();
-    for (texels, levels, steps, wide) in FINENESS {
+    let plain = FINENESS.map(|(texels, levels, steps, wide)| {
         let bits = if wide { 16 } else { 8 };
         let name = format!("tile of {texels} x {texels} x {levels}, {bits} bits, {steps} steps");
-        progress(&name);
-        let mut clouds = system(CloudQuality {
+        let quality = CloudQuality {
             texels,
             first_texels: texels,
             levels,
             steps,
             wide,
             ..fine
-        })?;
+        };
+        (name, quality)
+    });
+    let optional = OPTIONS.map(|(steps, half, jitter)| {
+        let name = format!(
+            "tile of 384 x 384 x 64, {steps} steps{}{}",
+            if half { ", half resolution" } else { "" },
+            if jitter {
+                ", starts shifted by the mask"
+            } else {
+                ""
+            }
+        );
+        let quality = CloudQuality {
+            texels: 384,
+            first_texels: 384,
+            steps,
+            half,
+            jitter,
+            ..fine
+        };
+        (name, quality)
+    });
+    let mut points = Vec::new();
+    for (name, quality) in plain.into_iter().chain(optional) {
+        progress(&name);
+        let mut clouds = system(quality)?;
         for _ in 0..3 {
             canvas.draw(&mut clouds, &view)?;
         }
@@ -275,6 +315,8 @@ pub fn run(
         });
     }
 
+    let options = points.split_off(FINENESS.len());
+
     progress("first frame");
     let high = CloudQuality {
         first_texels: 256,
@@ -288,7 +330,10 @@ pub fn run(
         psnr = canvas.picture()?.difference(&truth, exposure)?.psnr;
     }
     let first = Point {
-        name: "first frame, tile of 256 x 256 x 64, 8 bits, 96 steps".to_owned(),
+        name: format!(
+            "first frame, tile of {0} x {0} x {1}, 96 steps",
+            high.first_texels, high.levels
+        ),
         time: median(&times),
         psnr,
     };
@@ -334,6 +379,7 @@ pub fn run(
         loops,
         skipping,
         system: points,
+        options,
         first,
         moving,
         bytes: [
@@ -388,7 +434,7 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
     for p in &report.skipping {
         row(format!("the same with skipping, {}", p.name), p, ratio(p));
     }
-    for p in &report.system {
+    for p in report.system.iter().chain(&report.options) {
         row(format!("`Clouds`, {}", p.name), p, "-".to_owned());
     }
     for p in [&report.first, &report.moving] {
@@ -427,6 +473,7 @@ pub fn to_json(bench: &Bench, report: &Report, command: &str) -> serde_json::Val
     document["loops"] = list(&report.loops).into();
     document["skipping"] = list(&report.skipping).into();
     document["system"] = list(&report.system).into();
+    document["options"] = list(&report.options).into();
     document["first_and_moving"] = list(&[report.first.clone(), report.moving.clone()]).into();
     document["bytes"] = report.bytes.to_vec().into();
     document

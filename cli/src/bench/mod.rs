@@ -3,6 +3,7 @@
 pub mod baseline;
 pub mod chapter6;
 pub mod clouds;
+pub mod frames;
 pub mod ground;
 pub mod knob;
 pub mod noise;

@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 use crate::bench::knob::{self, Effect, Knob};
 use crate::bench::timing::{Clock, Rounds};
 use crate::bench::{
-    Bench, baseline, chapter6, clouds, ground, noise, presets, sky, terrain, write_text,
+    Bench, baseline, chapter6, clouds, frames, ground, noise, presets, sky, terrain, write_text,
 };
 use crate::catalog::{Catalog, SourceArgs};
 use crate::commands::render::{RenderArgs, read_json, write_json};
@@ -34,6 +34,8 @@ pub enum Subject {
     Terrain,
     /// A layer of clouds at equal error, beside the loop of `thesis`.
     Clouds,
+    /// Whole frames of sky, terrain and clouds, beside `thesis`.
+    Frames,
     /// A step of the living ground.
     Ground,
 }
@@ -169,6 +171,7 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 | Subject::Sky
                 | Subject::Terrain
                 | Subject::Clouds
+                | Subject::Frames
                 | Subject::Ground,
             ),
             Some(knob),
@@ -194,8 +197,9 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 Subject::Knob,
                 Subject::Terrain,
                 Subject::Clouds,
+                Subject::Frames,
             ]) || (matches!(subject, Subject::Knob | Subject::Clouds) && args.views.len() > 1),
-            "left out, or the subject `presets` or `terrain`, or one view of a knob or of clouds",
+            "left out, or the subject `presets`, `terrain` or `frames`, or one view of a knob or of clouds",
         ),
         (
             "--of",
@@ -371,6 +375,20 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 write_json(
                     &path.with_extension("json"),
                     &clouds::to_json(&bench, &report, &command),
+                )?;
+            }
+        }
+        Subject::Frames => {
+            let views = or_usual(&args.views, &VIEWS);
+            let lines = frames::run(&bench, &views, rounds.least, &mut progress)?;
+            bar.finish_and_clear();
+            let text = frames::markdown(&bench, &lines, &command);
+            print!("{text}");
+            if let Some(path) = &args.out {
+                write_text(path, &text)?;
+                write_json(
+                    &path.with_extension("json"),
+                    &frames::to_json(&bench, &lines, &command),
                 )?;
             }
         }

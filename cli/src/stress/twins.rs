@@ -1233,7 +1233,15 @@ pub fn registry() -> Vec<Entry> {
         beer_lambert,
         step_integral
     );
-    same!(list, "post::dither", "post", post, bayer_8x8, dither);
+    same!(
+        list,
+        "post::dither",
+        "post",
+        post,
+        bayer_8x8,
+        blue_mask,
+        dither
+    );
     same!(list, "post::srgb", "post", post, encode_srgb, decode_srgb);
     same!(
         list,

@@ -1,0 +1,92 @@
+//! Shadows of clouds on the ground of a plane.
+
+use crate::clouds::CloudShadow;
+
+/// What the program `terrain` reads of a layer of clouds.
+#[derive(Debug)]
+pub(super) struct CloudShade {
+    layout: wgpu::BindGroupLayout,
+    layer: wgpu::Buffer,
+    /// Where there are no clouds: a tile without depth.
+    clear: (wgpu::TextureView, wgpu::Sampler),
+    /// The tile that is bound; none for the clear one.
+    tile: Option<wgpu::TextureView>,
+    pub group: wgpu::BindGroup,
+    held: [f32; 10],
+}
+
+/// The fields of `CloudTile` for no clouds: everything is lit by the one texel of the clear tile.
+const CLEAR: [f32; 10] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
+
+impl CloudShade {
+    pub fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> CloudShade {
+        let layer = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("veduta cloud shadow"),
+            size: 40,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let tile = device
+            .create_texture(&wgpu::TextureDescriptor {
+                label: Some("veduta no clouds"),
+                size: Default::default(),
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D3,
+                format: wgpu::TextureFormat::Rg16Float,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            })
+            .create_view(&Default::default());
+        let clear = (tile, device.create_sampler(&Default::default()));
+        CloudShade {
+            group: bound(device, layout, &layer, &clear.0, &clear.1),
+            layout: layout.clone(),
+            layer,
+            clear,
+            tile: None,
+            held: [0.0; 10],
+        }
+    }
+
+    /// Takes the shadow of a frame; the number of writes.
+    pub fn set(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        shadow: Option<&CloudShadow<'_>>,
+    ) -> u32 {
+        let tile = shadow.map(|s| s.tile);
+        if tile != self.tile.as_ref() {
+            let (view, sampler) =
+                shadow.map_or((&self.clear.0, &self.clear.1), |s| (s.tile, s.sampler));
+            self.group = bound(device, &self.layout, &self.layer, view, sampler);
+            self.tile = tile.cloned();
+        }
+        let layer = shadow.map_or(CLEAR, |s| s.layer);
+        if layer == self.held {
+            return 0;
+        }
+        queue.write_buffer(&self.layer, 0, &layer.map(f32::to_le_bytes).concat());
+        self.held = layer;
+        1
+    }
+}
+
+fn bound(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    layer: &wgpu::Buffer,
+    tile: &wgpu::TextureView,
+    sampler: &wgpu::Sampler,
+) -> wgpu::BindGroup {
+    super::group(
+        device,
+        layout,
+        &[
+            layer.as_entire_binding(),
+            wgpu::BindingResource::Sampler(sampler),
+            wgpu::BindingResource::TextureView(tile),
+        ],
+    )
+}
