@@ -100,6 +100,8 @@ pub(super) struct PlaneTerrain {
     field: wgpu::Buffer,
     rock: wgpu::Buffer,
     held: [Vec<u8>; 3],
+    /// Whether rays look for the field itself where texels are wider than pixels.
+    searched: bool,
     /// Whether the view shows any ground.
     seen: bool,
 }
@@ -235,6 +237,7 @@ impl PlaneTerrain {
             ("OUTPUT", output),
             ("CLIP_STEPS", number("CLIP_STEPS", 500.0)),
             ("REFINE_STEPS", number("REFINE_STEPS", 2.0)),
+            ("SEARCH_STEPS", number("SEARCH_STEPS", 48.0)),
             ("ROCK_CHEAP", number("TEXTURE_LOW_QUALITY", 0.0)),
             ("SKY_SECTORS", f64::from(options.sky_sectors)),
         ];
@@ -296,6 +299,7 @@ impl PlaneTerrain {
             field,
             rock,
             held: Default::default(),
+            searched: number("SEARCH_STEPS", 48.0) > 0.0,
             seen: true,
         })
     }
@@ -361,6 +365,8 @@ impl PlaneTerrain {
             least: 0.35 * f64::from(pixel_angle) * nearest,
             near: nearest,
             far,
+            pixel_angle: f64::from(pixel_angle),
+            searched: self.searched,
             azimuths: azimuths([middle, right, up]),
             sun: (lights.sun != Vec3::ZERO).then(|| {
                 let to_sun = view.sun.to_light.normalize_or(Vec3::Y).as_dvec3();

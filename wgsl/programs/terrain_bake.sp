@@ -51,7 +51,7 @@ fn sweep(@builtin(local_invocation_index) index: u32, @builtin(workgroup_id) gro
                 for (var z = 0; z < count.y; z += 2) {
                     for (var x = 0; x < count.x; x += 2) {
                         let h = corners(heights, wrapping, clip, corner + vec2<i32>(x, z), level);
-                        top = max(top, max(max(h.x, h.y), max(h.z, h.w)));
+                        top = max(top, max(max(h.x, h.y), max(h.z, h.w)) + clip.margin * place.w);
                     }
                 }
             }
