@@ -671,7 +671,6 @@ impl Clipmap {
             } else {
                 0.0
             },
-            ..Default::default()
         };
         let bytes = clip.to_bytes().to_vec();
         if bytes != self.clip_bytes {

@@ -60,7 +60,7 @@ impl TerrainLights {
 /// Choices that are made once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TerrainOptions {
-    /// The quality. Of its keys these are read: CLIP_STEPS, CLIP_TEXELS, REFINE_STEPS and TEXTURE_LOW_QUALITY on the plane, GLOBE_STEPS and GLOBE_STEPS_SHADOW over a ball; all others are those of
+    /// The quality. Of its keys these are read: CLIP_STEPS, CLIP_TEXELS, REFINE_STEPS, SEARCH_STEPS and TEXTURE_LOW_QUALITY on the plane, GLOBE_STEPS and GLOBE_STEPS_SHADOW over a ball; all others are those of
     /// other systems, and of the landscape's own march.
     pub preset: Preset,
     /// The ground.
