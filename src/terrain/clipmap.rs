@@ -47,6 +47,10 @@ const BORDER: i64 = BLOCK / 2 + 4;
 /// Rings around the eye at most, a multiple of 64.
 const RINGS: u32 = 1024;
 
+/// How near the baked ground rays look for the field itself (texels), where texels are wider than pixels. Of V12, whose pixels are a fifth of them, 0.1 leaves 0.37 % of the rays wrong at the
+/// silhouette, 0.2 0.2 %, 0.25 0.17 % and 0.35 0.12 %, for more steps each.
+const MARGIN: f32 = 0.25;
+
 /// Where an eye looks, as far as baking is concerned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gaze {
@@ -56,6 +60,9 @@ pub(super) struct Gaze {
     pub near: f64,
     /// Distance at which rays end (m).
     pub far: f64,
+    /// Angle of a pixel (rad), and whether rays look for the field itself where texels are wider.
+    pub pixel_angle: f64,
+    pub searched: bool,
     /// The azimuths that are looked at, from +x towards +z: the first and the extent (rad).
     pub azimuths: [f64; 2],
     /// The light that throws shadows: the unit vector to it, and its angular radius (rad).
@@ -663,6 +670,7 @@ impl Clipmap {
         let scale = gaze.near.min(32.0 * texel / width).max(4.0 * texel);
         let span = (gaze.far.min(self.reach() * std::f64::consts::SQRT_2) / scale).asinh();
         let growth = width.max(span / f64::from(RINGS));
+        let reach = (self.texels / 2 - BORDER) as f32;
         let clip = ClipBlock {
             rings: ((span / growth / 64.0).ceil() as i32 * 64).min(RINGS as i32),
             sectors: self.sectors[0],
@@ -673,10 +681,16 @@ impl Clipmap {
             ground_radius: self.planet_radius as f32,
             eye_altitude: eye.altitude() as f32,
             spacing: self.spacing as f32,
-            reach: (self.texels / 2 - BORDER) as f32,
+            reach,
             texels: self.texels as i32,
             first: self.first as i32,
             levels: self.levels as i32,
+            // A texel is one to two of its distance over the reach wide.
+            margin: if gaze.searched && gaze.pixel_angle * f64::from(reach) < 1.0 {
+                MARGIN
+            } else {
+                0.0
+            },
         };
         let bytes = clip.to_bytes().to_vec();
         if bytes != self.clip_bytes {

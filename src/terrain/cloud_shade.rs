@@ -12,17 +12,17 @@ pub(super) struct CloudShade {
     /// The tile that is bound; none for the clear one.
     tile: Option<wgpu::TextureView>,
     pub group: wgpu::BindGroup,
-    held: [f32; 10],
+    held: [f32; 12],
 }
 
 /// The fields of `CloudTile` for no clouds: everything is lit by the one texel of the clear tile.
-const CLEAR: [f32; 10] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
+const CLEAR: [f32; 12] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0];
 
 impl CloudShade {
     pub fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> CloudShade {
         let layer = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("veduta cloud shadow"),
-            size: 40,
+            size: 48,
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
@@ -45,7 +45,7 @@ impl CloudShade {
             layer,
             clear,
             tile: None,
-            held: [0.0; 10],
+            held: [0.0; 12],
         }
     }
 

@@ -31,7 +31,7 @@ impl<T: Real> Ground<T> {
 }
 
 /// What strata make of a value of a given variance: the mean, its slope, and what its slope's square varies by.
-fn strata<T: Real>(value: T, period: T, hardness: T, variance: T) -> [T; 3] {
+pub(super) fn strata<T: Real>(value: T, period: T, hardness: T, variance: T) -> [T; 3] {
     let (one, two) = (T::of(1.0), T::of(2.0));
     let turn = value / period;
     let r = turn - (turn + T::of(0.5)).whole();

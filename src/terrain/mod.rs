@@ -12,6 +12,7 @@ mod ground;
 #[cfg(feature = "reference")]
 mod judge;
 mod land;
+mod local;
 mod map;
 #[cfg(feature = "height_maps")]
 mod map_file;
@@ -37,6 +38,7 @@ pub use ground::{Ground, Prepared};
 #[cfg(feature = "reference")]
 pub use judge::{HitErrors, hit_errors};
 pub use land::{Land, Material, Sea};
+pub use local::LocalBounds;
 pub use map::{Edge, HeightMap, MapTexels};
 pub use noise::Place;
 #[cfg(feature = "reference")]

@@ -456,6 +456,8 @@ impl TerrainQuery {
             least: 0.35 * f64::from(pixel_angle) * above,
             near: above,
             far: farthest,
+            pixel_angle: f64::from(pixel_angle),
+            searched: true,
             azimuths: [0.0, std::f64::consts::TAU],
             sun: None,
         };

@@ -63,7 +63,7 @@ impl TerrainLights {
 /// Choices that are made once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TerrainOptions {
-    /// The quality. Of its keys these are read: CLIP_STEPS, CLIP_TEXELS, REFINE_STEPS and TEXTURE_LOW_QUALITY on the plane, GLOBE_STEPS and GLOBE_STEPS_SHADOW over a ball; all others are those of
+    /// The quality. Of its keys these are read: CLIP_STEPS, CLIP_TEXELS, REFINE_STEPS, SEARCH_STEPS and TEXTURE_LOW_QUALITY on the plane, GLOBE_STEPS and GLOBE_STEPS_SHADOW over a ball; all others are those of
     /// other systems, and of the landscape's own march.
     pub preset: Preset,
     /// The ground.
@@ -108,6 +108,8 @@ pub(super) struct PlaneTerrain {
     held: [Vec<u8>; 3],
     /// What the program reads of clouds.
     shade: Option<CloudShade>,
+    /// Whether rays look for the field itself where texels are wider than pixels.
+    searched: bool,
     /// Whether the view shows any ground.
     seen: bool,
 }
@@ -295,6 +297,7 @@ impl PlaneTerrain {
             ("OUTPUT", output),
             ("CLIP_STEPS", number("CLIP_STEPS", 500.0)),
             ("REFINE_STEPS", number("REFINE_STEPS", 2.0)),
+            ("SEARCH_STEPS", number("SEARCH_STEPS", 48.0)),
             ("ROCK_CHEAP", number("TEXTURE_LOW_QUALITY", 0.0)),
             ("SKY_SECTORS", f64::from(options.sky_sectors)),
         ];
@@ -368,6 +371,7 @@ impl PlaneTerrain {
             rock,
             held: Default::default(),
             shade,
+            searched: number("SEARCH_STEPS", 48.0) > 0.0,
             seen: true,
         })
     }
@@ -469,6 +473,8 @@ impl PlaneTerrain {
             near: nearest,
             far,
             azimuths,
+            pixel_angle: f64::from(pixel_angle),
+            searched: self.searched,
             sun: (lights.sun != Vec3::ZERO).then(|| {
                 let to_sun = view.sun.to_light.normalize_or(Vec3::Y).as_dvec3();
                 (to_sun.to_array(), f64::from(view.sun.angular_radius))

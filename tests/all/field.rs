@@ -73,6 +73,82 @@ fn footprint(random: &mut Random) -> f32 {
     0.5 * 2000_f32.powf(random.unit())
 }
 
+/// Bounds over squares, against 200 places in each, at random and at the corners; and how much wider they are than what these find.
+#[test]
+fn bounds_over_a_square_hold_and_are_close_over_a_small_one() {
+    let mut random = Random(7);
+    for (name, field) in fields() {
+        if let Kind::Own { .. } = field.kind {
+            continue;
+        }
+        let double = field.prepare::<f64>().unwrap();
+        let whole = field.bounds().unwrap();
+        for (size, width) in [
+            (4.0, 0.0),
+            (60.0, 0.0),
+            (60.0, 30.0),
+            (900.0, 0.0),
+            (900.0, 200.0),
+        ] {
+            let (mut wide, mut found, mut steep, mut climbed) = (0.0, 0.0, 0.0, 0.0_f64);
+            for _ in 0..6 {
+                let corner = position(&mut random, 1e7);
+                let over = double.bounds_over(corner, size, width).unwrap();
+                assert!(over.minimum >= whole.minimum && over.maximum <= whole.maximum);
+                assert!(over.lipschitz <= whole.lipschitz);
+                let eye = double.place(corner);
+                let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+                for k in 0..200 {
+                    let at = match k {
+                        0..4 => [f64::from(k % 2), f64::from(k / 2)],
+                        _ => [random.unit(), random.unit()].map(f64::from),
+                    };
+                    let g = double.ground_from(eye, at.map(|a| a * size), width);
+                    let slope = g.slope[0].hypot(g.slope[1]);
+                    assert!(
+                        over.minimum <= g.height && g.height <= over.maximum,
+                        "{name}, {size} m, {width} m: {} of {over:?}",
+                        g.height
+                    );
+                    assert!(slope <= over.lipschitz, "{name}: {slope} of {over:?}");
+                    (low, high) = (low.min(g.height), high.max(g.height));
+                    climbed = climbed.max(slope);
+                }
+                wide += over.maximum - over.minimum;
+                found += high - low;
+                steep += over.lipschitz / 6.0;
+            }
+            println!(
+                "{name}, {size} m, samples of {width} m: {:.1} times as high as found, slope {steep:.2} of {:.2}, found {climbed:.2}",
+                wide / found,
+                whole.lipschitz
+            );
+            // Followed octave by octave: over a square that all octaves are wider than, and far below the bounds of the whole field.
+            if size == 4.0
+                && matches!(
+                    field.kind,
+                    Kind::Fbm | Kind::Ridged { .. } | Kind::Hybrid { .. }
+                )
+            {
+                assert!(wide / 6.0 < 0.2 * (whole.maximum - whole.minimum), "{name}");
+                assert!(steep < 0.7 * whole.lipschitz, "{name}: {steep}");
+            }
+        }
+        let corner = WorldPos::default();
+        for (size, width, what) in [
+            (-1.0, 0.0, "size"),
+            (f64::NAN, 0.0, "size"),
+            (1.0, 2e6, "footprint"),
+        ] {
+            let error = double
+                .bounds_over(corner, size, width)
+                .unwrap_err()
+                .to_string();
+            assert!(error.contains(what), "{error}");
+        }
+    }
+}
+
 #[test]
 fn the_device_is_the_processor_to_its_last_places_and_truth_to_thirty_millimetres() {
     let mut random = Random(1);
@@ -104,12 +180,7 @@ fn the_device_is_the_processor_to_its_last_places_and_truth_to_thirty_millimetre
             "{name}: {same} of {total} bit by bit, {worst:.1} places, {:.1} mm",
             1e3 * off
         );
-        // 4 are the aim. The hybrid misses it with 9 (a millimetre): where the noise is added to something at once, the driver's compiler takes it in another order, which shows with one octave.
-        let bar = match name {
-            "hybrid" => 12.0,
-            _ => 4.0,
-        };
-        assert!(worst <= bar, "{name}: {worst} places");
+        assert!(worst <= 4.0, "{name}: {worst} places");
         assert!(off <= 0.030, "{name}: {off} m");
     }
 }
@@ -459,8 +530,7 @@ fn heights_a_hundred_kilometres_from_the_eye_are_true_to_thirty_millimetres() {
             apart
         );
         assert!(off <= 0.030, "{name}: {off} m");
-        let bar = if name == "hybrid" { 12.0 } else { 4.0 };
-        assert!(apart <= bar, "{name}: {apart} places");
+        assert!(apart <= 4.0, "{name}: {apart} places");
     }
 }
 

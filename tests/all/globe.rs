@@ -121,10 +121,7 @@ fn a_ball_is_the_same_on_the_device_the_processor_and_by_definition() {
             1e3 * off,
             1e3 * definition
         );
-        assert!(
-            worst <= if name == "hybrid" { 12.0 } else { 4.0 },
-            "{name}: {worst}"
-        );
+        assert!(worst <= 4.0, "{name}: {worst}");
         assert!(off <= 0.030, "{name}: {off} m");
         // The series have f32 members in the reference's field.
         assert!(definition <= 0.03 && tilt <= 1e-2, "{name}");

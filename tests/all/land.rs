@@ -147,6 +147,89 @@ pub fn drawn(
     (floats(&color), floats(&depth), work)
 }
 
+/// Judges `found_hit`: through a lens of 10 degrees texels of `high` are up to seven pixels wide (V12), and the crests between them have to be found on the field. Without the search 0.04 % of
+/// these rays are wrong, 0.6 % at the silhouette, and the errors of 99 % are within 5 footprints.
+#[test]
+fn a_long_lens_meets_crests_that_are_finer_than_texels() {
+    use veduta::terrain::{Terrain, TerrainHit, TerrainLights, TerrainOptions};
+    let land = Land::named("thesis").unwrap();
+    let field = land.field.prepare::<f64>().unwrap();
+    let (columns, rows) = (256_usize, 144_usize);
+    let foot = WorldPos::from_metres([13_500.0, 0.0, -14_700.0].into());
+    let ground = field.ground(foot, 0.0).height;
+    let mut view = veduta::View {
+        eye: foot.moved_by([0.0, ground + 1500.0, 0.0].into()),
+        ..Default::default()
+    };
+    view.look(0.0, (-1_f64).to_radians(), 10_f32.to_radians(), 16.0 / 9.0);
+    let targets = veduta::Targets {
+        color_format: wgpu::TextureFormat::Rgba32Float,
+        depth_format: Some(wgpu::TextureFormat::Depth32Float),
+        ..Default::default()
+    };
+    let options = TerrainOptions {
+        land: land.clone(),
+        far: 50_000.0,
+        ..Default::default()
+    };
+    let gpu = gpu();
+    let mut terrain = Terrain::new(&gpu.device, veduta::programs(), &targets, &options).unwrap();
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let lights = TerrainLights::clear(veduta::glam::Vec3::ONE);
+    let _ = terrain
+        .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+        .unwrap();
+    gpu.queue.submit([encoder.finish()]);
+    let (_, depths, _) = drawn(&terrain, columns, rows, 0.0);
+    let [middle, right, up] = view.rays().unwrap().map(|v| v.as_dvec3());
+    let forward = view
+        .world_from_view
+        .transform_vector3(veduta::glam::Vec3::NEG_Z)
+        .as_dvec3();
+    let [from, scale] = [view.projection.w_axis.z, view.projection.z_axis.z].map(f64::from);
+    let at = |k: usize, n: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
+    // The third of the picture around the skyline.
+    let (mut rays, mut found) = (Vec::new(), Vec::new());
+    for (i, depth) in depths.iter().enumerate() {
+        if i / columns < rows / 3 || i / columns >= 2 * rows / 3 {
+            continue;
+        }
+        let dir =
+            (middle + right * at(i % columns, columns) - up * at(i / columns, rows)).normalize();
+        rays.push(TerrainRay {
+            origin: view.eye,
+            dir: dir.to_array(),
+            far: 50_000.0,
+        });
+        let depth = f64::from(*depth);
+        found.push(TerrainHit {
+            distance: if depth > 0.0 {
+                from / (depth + scale) / dir.dot(forward)
+            } else {
+                f64::INFINITY
+            },
+            ..TerrainHit::MISS
+        });
+    }
+    let angle = 2.0 * up.length() / rows as f64;
+    let errors = hit_errors(&land, &rays, columns, angle, &found).unwrap();
+    let count = rays.len() as f64;
+    println!(
+        "{} hits of {count}; wrong {:.3} %, at the silhouette {:.3} %; error in footprints: median {:.3}, 95 % {:.3}, 99 % {:.3}",
+        errors.across.len(),
+        100.0 * errors.wrong as f64 / count,
+        100.0 * errors.at_silhouette as f64 / count,
+        errors.centile(0.5),
+        errors.centile(0.95),
+        errors.centile(0.99)
+    );
+    assert!(errors.across.len() > 2000);
+    assert!(errors.wrong as f64 <= 2e-4 * count);
+    // The rows around the skyline are a third of the picture, which has 0.3 % at most.
+    assert!(errors.at_silhouette as f64 <= 9e-3 * count);
+    assert!(errors.centile(0.99) <= 0.5);
+}
+
 #[test]
 fn sky_is_not_drawn_and_no_ground_is_lost_with_it() {
     use veduta::glam::Vec3;

@@ -116,10 +116,10 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #FRAGMENT{
     #CODE{
 #import veduta::planet::shell::{altitude_of}
-#import veduta::terrain::clipmap::{Clip, Sweep, clip_hit, likely_distance, sun_share}
+#import veduta::terrain::clipmap::{Clip, Sweep, sun_share}
 #import veduta::terrain::field::{Field}
 #import veduta::terrain::relief::{land_at}
-#import veduta::terrain::refine::{refined_hit}
+#import veduta::terrain::refine::{found_hit}
 #import veduta::terrain::material::{Rock, faded_noise, rock_low_faded, rock_high_faded, snow_blend}
 #import veduta::terrain::shading::{ThreeLights, shade_rough}
 #import veduta::terrain::sky_share::{sky_share}
@@ -154,6 +154,8 @@ override OUTPUT: i32 = 0;
 override CLIP_STEPS: i32 = 500;
 // Steps from the baked ground to the field.
 override REFINE_STEPS: i32 = 2;
+// Most places where the field itself is looked for, where texels are wider than footprints.
+override SEARCH_STEPS: i32 = 48;
 // Whether the rock has one fractal instead of four.
 override ROCK_CHEAP: i32 = 0;
 // Sectors in which horizons take light off the sky; 0: none.
@@ -182,13 +184,10 @@ fn shown(radiance: vec3<f32>, pixel: vec2<f32>) -> vec4<f32> {
 fn draw(in: Corner) -> Shown {
     let dir = normalize(in.ray);
     let angle = draw_view.pixel_angle;
-    let hit = clip_hit(heights, wrapping, sectors, places, clip, dir, draw_view.far, CLIP_STEPS);
-    let met = likely_distance(clip, dir, hit, draw_view.far, CLIP_STEPS);
+    let found = found_hit(heights, wrapping, sectors, places, relief, clip, field, FIELD_KIND, dir, draw_view.far, angle, CLIP_STEPS, REFINE_STEPS, SEARCH_STEPS);
     // Where nothing is met the rest takes no rounds of any loop.
-    let is_met = met >= 0.0;
-    let pixel = select(1e30, angle, is_met);
-    let found = refined_hit(relief, field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, vec3<f32>(0.0), dir, max(met, 1e-3), pixel, hit.slope, 2.0 * hit.spacing, select(0, REFINE_STEPS, is_met));
-    let point = dir * found.distance;
+    let is_met = found.distance >= 0.0;
+    let point = dir * max(found.distance, 1e-3);
     // A pixel covers more ground the more it slants.
     let normal = normalize(vec3<f32>(-found.slope.x, 1.0, -found.slope.y));
     let footprint = select(1e30, angle * found.distance / max(-dot(normal, dir), 0.05), is_met);

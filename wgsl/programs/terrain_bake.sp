@@ -57,7 +57,7 @@ fn sweep(@builtin(local_invocation_index) index: u32, @builtin(workgroup_id) gro
                     for (var x = 0; x < count.x; x += 2) {
                         let middle = vec2<f32>(((corner + vec2<i32>(x, z)) & vec2<i32>(squares - 1)) + 1) / f32(squares);
                         let h = textureGather(0, peaks, wrapping, middle, level);
-                        top = max(top, max(max(h.x, h.y), max(h.z, h.w)));
+                        top = max(top, max(max(h.x, h.y), max(h.z, h.w)) + clip.margin * place.w);
                     }
                 }
             }

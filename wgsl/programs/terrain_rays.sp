@@ -7,14 +7,16 @@ Where given rays meet a terrain, one invocation a ray: over baked heights with a
 #import veduta::terrain::field::{Field}
 #import veduta::terrain::relief::{land_at}
 #import veduta::planet::shell::{altitude_of, up_at}
-#import veduta::terrain::clipmap::{likely_end}
 #ifdef TERRAIN_FAST
-#import veduta::terrain::clipmap::{Clip, clip_hit, likely_distance}
-#import veduta::terrain::refine::{refined_hit}
+#import veduta::terrain::clipmap::{Clip}
+#import veduta::terrain::refine::{found_hit}
+#else
+#import veduta::terrain::clipmap::{likely_end}
 #endif
 
 override FIELD_KIND: i32 = 2;
 override REFINE_STEPS: i32 = 2;
+override SEARCH_STEPS: i32 = 48;
 override MAX_MARCHING_STEPS: i32 = 200;
 override STEP_FACTOR: f32 = 0.5;
 override MARCH_EPSILON: f32 = 1.0;
@@ -87,15 +89,13 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let ray = rays[id.x];
 #ifdef TERRAIN_FAST
-    let hit = clip_hit(heights, wrapping, sectors, places, clip, ray.dir, ray.far, MAX_MARCHING_STEPS);
-    let capped = hit.steps == MAX_MARCHING_STEPS && hit.distance < 0.0;
-    let met = likely_distance(clip, ray.dir, hit, ray.far, MAX_MARCHING_STEPS);
-    let found = refined_hit(relief, field, FIELD_KIND, clip.ground_radius, clip.eye_altitude, ray.origin, ray.dir, max(met, 0.0), ray.pixel_angle, hit.slope, 2.0 * hit.spacing, REFINE_STEPS).distance;
+    let hit = found_hit(heights, wrapping, sectors, places, relief, clip, field, FIELD_KIND, ray.dir, ray.far, ray.pixel_angle, MAX_MARCHING_STEPS, REFINE_STEPS, SEARCH_STEPS);
+    let found = max(hit.distance, 0.0);
     // The ground at the hit itself.
-    let at = ray.dir * max(found, 0.0);
-    let ground = land_at(relief, field, FIELD_KIND, at.xz, ray.pixel_angle * max(found, 0.0));
+    let at = ray.dir * found;
+    let ground = land_at(relief, field, FIELD_KIND, at.xz, ray.pixel_angle * found);
     let gradient = up_at(clip.ground_radius, clip.eye_altitude, at) - vec3<f32>(ground.slope.x, 0.0, ground.slope.y);
-    results[id.x] = HitRow(select(found, -1.0, met < 0.0), normalize(gradient), ground.height, select(hit.steps, -1, capped));
+    results[id.x] = HitRow(hit.distance, normalize(gradient), ground.height, select(hit.steps, -1, hit.capped));
 #else
     var here = field;
     here.cell = ray.cell;

@@ -36,6 +36,8 @@ struct Clip {
     /// Ring k begins at `ring_scale` sinh(`ring_growth` k) from the eye's axis [m].
     ring_scale: f32,
     ring_growth: f32,
+    /// How near the baked ground rays look for the field itself, since texels are wider than footprints [texels]; 0 where they are not.
+    margin: f32,
 }
 
 /// What a ray found.
@@ -118,17 +120,17 @@ fn clearing_tangent(ground_radius: f32, eye_altitude: f32, top: f32, near: f32, 
     return tangent + 1e-6 + 1e-5 * abs(tangent);
 }
 
-/// First place where a ray from the eye meets the baked ground before `far`. A ray that uses up `max_steps` has no hit, but tells how far it came. `sectors`
-/// holds, for each sector of azimuth, the tangents that clear the ground of its rings; see `veduta::terrain_bake`.
+/// First place from the distance `near` on where a ray from the eye meets the baked ground, or comes nearer to it than the margin, before `far`. A ray that uses up `max_steps` has no hit, but tells how far it came. `sectors` holds, for each sector of azimuth, the tangents that clear the ground of its rings; see `veduta::terrain_bake`.
 ///
 /// domain  dir in [-1, 1] 1 lin
+/// domain  near in [0, 1e6] m lin
 /// domain  far in [0, 1e6] m lin
 /// domain  max_steps in [0, 10000] 1 lin
 /// range   [-1e6, 1e6] m
 /// error   1 abs of reference::intersect::first_crossing
 /// outside undefined
 /// source  Tevs2008 (maxima of many sizes); departs: maxima of elevations, by sector and ring
-fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_2d<f32>, places: texture_2d<f32>, clip: Clip, dir: vec3<f32>, far: f32, max_steps: i32) -> ClipHit {
+fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_2d<f32>, places: texture_2d<f32>, clip: Clip, dir: vec3<f32>, near: f32, far: f32, max_steps: i32) -> ClipHit {
     var hit = ClipHit(-1.0, 0.0, 0.0, clip.spacing, vec2<f32>(0.0), 0);
     let start = clip.eye_altitude;
     let radius = clip.ground_radius + start;
@@ -138,8 +140,10 @@ fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_
     let outwards = 1.0 / max(length(dir.xz), 1e-6);
     let tangent = dir.y * outwards;
     let sector = i32(floor(atan2(dir.z, dir.x) * (0.15915494309 * f32(clip.sectors)))) & (clip.sectors - 1);
-    var ring = 0;
-    var t = 0.0;
+    // The ring of the first place; the rounding of the logarithm is on the safe side.
+    let begin = near / (outwards * clip.ring_scale);
+    var ring = max(i32(floor(log(begin + sqrt(begin * begin + 1.0)) / clip.ring_growth - 1e-3)), 0);
+    var t = near;
     var done = false;
     while hit.steps < max_steps && !done {
         // Rings above whose ground the ray passes: 64, 8 or one at a time.
@@ -189,9 +193,9 @@ fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_
             hit.clearance = here;
             hit.spacing = place.w;
             hit.steps += 1;
-            if min(here, there) <= 0.0 {
+            if min(here, there) <= clip.margin * place.w {
                 hit.slope = 0.5 * place.z * vec2<f32>(h.y - h.x + h.w - h.z, h.z - h.x + h.w - h.y);
-                hit.distance = t + step * max(here, 0.0) / max(max(here, 0.0) - there, 1e-9);
+                hit.distance = t + select(0.0, step * max(here, 0.0) / max(max(here, 0.0) - there, 1e-9), there <= 0.0);
                 done = true;
                 break;
             }

@@ -177,7 +177,8 @@ fn octave_sum(field: Field, kind: i32, start: Lattice2d, footprint: f32) -> Grou
             weight = select(next, vec3<f32>(1.0, 0.0, 0.0), next.x >= 1.0);
             term *= amplitude;
         } else if kind == FIELD_HYBRID {
-            let signal = amplitude * vec3<f32>(n.x + field.shape, frequency * n.yz);
+            // Compilers take the sums of the noise and this one in any order; a bound that no noise reaches keeps them apart.
+            let signal = amplitude * vec3<f32>(max(n.x, -8.0) + field.shape, frequency * n.yz);
             term = vec3<f32>(weight.x * signal.x, weight.x * signal.yz + signal.x * weight.yz);
             weight = select(term, vec3<f32>(1.0, 0.0, 0.0), term.x >= 1.0);
         } else if kind == FIELD_CRATERS {

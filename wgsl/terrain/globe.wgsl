@@ -197,7 +197,8 @@ fn globe_octaves(globe: Globe, kind: i32, cell: vec3<i32>, frac: vec3<f32>, up: 
             weight = select(next, vec4<f32>(1.0, 0.0, 0.0, 0.0), next.x >= 1.0);
             term *= amplitude;
         } else if kind == FIELD_HYBRID {
-            let signal = amplitude * vec4<f32>(n.x + globe.shape, frequency * n.yzw);
+            // Kept apart as in `veduta::terrain::field`.
+            let signal = amplitude * vec4<f32>(max(n.x, -8.0) + globe.shape, frequency * n.yzw);
             term = vec4<f32>(weight.x * signal.x, weight.x * signal.yzw + signal.x * weight.yzw);
             weight = select(term, vec4<f32>(1.0, 0.0, 0.0, 0.0), term.x >= 1.0);
         } else if kind == FIELD_CRATERS {

@@ -1,9 +1,11 @@
-//! The last step to a hit: from the baked ground to the field itself, as the pixel's footprint filters it.
-//! source   Newton's method
+//! From the baked ground to the field itself, as the pixel's footprint filters it: a last step, or, where texels are wider than footprints, a search of the field wherever a ray comes close to what
+//! is baked.
+//! source   Newton's method; the search: Keinert2014 (steps by the clearance, longer than the steepest slope allows), regula falsi
 //! symbols  t distance along the ray [m] · pixel_angle angle of a pixel [rad], so that the footprint is pixel_angle t
 #define_import_path veduta::terrain::refine
 
 #import veduta::planet::shell::{up_at, altitude_of}
+#import veduta::terrain::clipmap::{Clip, clip_hit, likely_distance}
 #import veduta::terrain::field::{Field}
 #import veduta::terrain::relief::{land_at}
 
@@ -15,7 +17,7 @@ struct RefinedHit {
     slope: vec2<f32>,
 }
 
-/// A hit moved onto the field, by at most `most` metres, in so many steps. `slope` is that of what was hit; without a step it stays.
+/// A hit moved onto the field, by at most `most` metres, in so many steps, and up to as many again while they are longer than a quarter of a footprint. `slope` is that of what was hit; without a step it stays.
 ///
 /// domain  kind in [0, 7] 1 lin
 /// domain  ground_radius in [3e6, 1e8] m log
@@ -33,7 +35,11 @@ struct RefinedHit {
 /// source  Newton's method
 fn refined_hit(relief: texture_2d<f32>, field: Field, kind: i32, ground_radius: f32, eye_altitude: f32, origin: vec3<f32>, dir: vec3<f32>, t: f32, pixel_angle: f32, slope: vec2<f32>, most: f32, steps: i32) -> RefinedHit {
     var hit = RefinedHit(t, slope);
-    for (var i = 0; i < steps; i++) {
+    var moved = 0.0;
+    for (var i = 0; i < 2 * steps; i++) {
+        if i >= steps && moved <= 0.25 * pixel_angle * hit.distance {
+            break;
+        }
         let at = origin + dir * hit.distance;
         let ground = land_at(relief, field, kind, at.xz, pixel_angle * hit.distance);
         let gradient = up_at(ground_radius, eye_altitude, at) - vec3<f32>(ground.slope.x, 0.0, ground.slope.y);
@@ -41,7 +47,113 @@ fn refined_hit(relief: texture_2d<f32>, field: Field, kind: i32, ground_radius: 
         hit.slope = ground.slope;
         // The clearance falls along a ray that meets the ground.
         let fall = max(-dot(gradient, dir), 0.02);
-        hit.distance = clamp(hit.distance + clearance / fall, max(t - most, 0.0), t + most);
+        let next = clamp(hit.distance + clearance / fall, max(t - most, 0.0), t + most);
+        moved = abs(next - hit.distance);
+        hit.distance = next;
     }
     return hit;
+}
+
+/// Where a ray from the eye meets the field.
+struct FoundHit {
+    /// Distance [m]; -1 if nothing is met.
+    distance: f32,
+    /// Slope along x and z.
+    slope: vec2<f32>,
+    /// Steps over baked heights.
+    steps: i32,
+    /// Whether they did not suffice, so that the answer is what is most likely.
+    capped: bool,
+}
+
+/// A slope that is rarely exceeded along a ray.
+const SEARCH_STEEP: f32 = 0.8;
+
+/// Where a ray from the eye meets the field: over baked heights with so many last steps on the field. Where texels are wider than footprints these do not know the field's crests: there, within the
+/// margin of what is baked, the field itself is looked for in steps of half a footprint or of the clearance over the slopes that are usual, and bracketed; at most `search_steps` times.
+///
+/// domain  kind in [0, 7] 1 lin
+/// domain  dir in [-1, 1] 1 lin
+/// domain  far in [0, 1e6] m lin
+/// domain  pixel_angle in [1e-5, 0.1] 1 log
+/// domain  max_steps in [0, 10000] 1 lin
+/// domain  refine_steps in [0, 4] 1 lin
+/// domain  search_steps in [0, 1000] 1 lin
+/// range   [-1e6, 1e6] 1
+/// error   1 abs of reference::intersect::first_crossing
+/// outside undefined
+/// source  Tevs2008; Keinert2014; Newton's method
+fn found_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_2d<f32>, places: texture_2d<f32>, relief: texture_2d<f32>, clip: Clip, field: Field, kind: i32, dir: vec3<f32>, far: f32, pixel_angle: f32, max_steps: i32, refine_steps: i32, search_steps: i32) -> FoundHit {
+    let fall = max(SEARCH_STEEP * length(dir.xz) - dir.y, 0.25);
+    var near = 0.0;
+    var steps = 0;
+    var left = select(0, search_steps, clip.margin > 0.0);
+    var found = FoundHit(-1.0, vec2<f32>(0.0), 0, false);
+    // How far the last steps may lead, and how many there are.
+    var most = 0.0;
+    var last = refine_steps;
+    while true {
+        let hit = clip_hit(heights, wrapping, sectors, places, clip, dir, near, far, max_steps - steps);
+        steps += hit.steps;
+        if hit.distance < 0.0 || left <= 0 {
+            found.capped = hit.distance < 0.0 && steps >= max_steps;
+            found.distance = likely_distance(clip, dir, hit, far, max_steps - steps + hit.steps);
+            found.slope = hit.slope;
+            most = 2.0 * hit.spacing;
+            break;
+        }
+        let start = max(hit.distance, near);
+        var t = start;
+        var back = 1.2;
+        var clear = -1.0;
+        var clear_by = 0.0;
+        var below = -1.0;
+        var below_by = 0.0;
+        while left > 0 {
+            left -= 1;
+            let at = dir * t;
+            let footprint = pixel_angle * t;
+            let clearance = altitude_of(clip.ground_radius, clip.eye_altitude, at) - land_at(relief, field, kind, at.xz, footprint).height;
+            if clearance <= 0.0 {
+                below = t;
+                below_by = clearance;
+            } else {
+                clear = t;
+                clear_by = clearance;
+            }
+            if below >= 0.0 && clear >= 0.0 {
+                t = clear + (below - clear) * clamp(clear_by / max(clear_by - below_by, 1e-9), 0.1, 0.9);
+                if below - clear < max(0.6 * footprint, 3e-7 * t + 1e-4) {
+                    break;
+                }
+            } else if below >= 0.0 {
+                // Below the ground where the search began: back to where it is not.
+                if t <= near {
+                    break;
+                }
+                t = max(t - max(0.5 * footprint, back * clearance / -fall), near);
+                back *= 2.0;
+            } else {
+                if t > far || (clearance > clip.margin * hit.spacing && t > start + 2.0 * hit.spacing) {
+                    break;
+                }
+                t += max(0.5 * footprint, clearance / fall);
+            }
+        }
+        // Within the bracket that it has, also when the steps are used up.
+        if below >= 0.0 {
+            found.distance = t;
+            most = 0.5 * pixel_angle * t;
+            last = 1;
+            break;
+        }
+        near = t;
+    }
+    found.steps = steps;
+    if found.distance >= 0.0 {
+        let refined = refined_hit(relief, field, kind, clip.ground_radius, clip.eye_altitude, vec3<f32>(0.0), dir, max(found.distance, 1e-3), pixel_angle, found.slope, most, last);
+        found.distance = refined.distance;
+        found.slope = refined.slope;
+    }
+    return found;
 }

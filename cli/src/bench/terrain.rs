@@ -4,7 +4,8 @@ use serde_json::json;
 use veduta::glam::Vec3;
 use veduta::temporal::{Temporal, TemporalOptions};
 use veduta::terrain::{
-    HitErrors, Land, Terrain, TerrainHit, TerrainLights, TerrainOptions, TerrainRay, hit_errors,
+    HitErrors, Land, Prepared, Terrain, TerrainHit, TerrainLights, TerrainOptions, TerrainRay,
+    hit_errors,
 };
 use veduta::view::direction;
 use veduta::{Preset, Targets, Value, View, wgpu};
@@ -361,6 +362,7 @@ fn line(bench: &Bench, name: &str, plan: &Plan) -> Result<Line, CliError> {
         Output::Linear,
     )?;
     renderer.warm_up(&view)?;
+    let field = Land::named("thesis")?.field.prepare()?;
     let mut drawers = Vec::new();
     let mut presets = Vec::new();
     let mut ground = 0.0;
@@ -368,7 +370,7 @@ fn line(bench: &Bench, name: &str, plan: &Plan) -> Result<Line, CliError> {
         // The converged pictures have the finest heights there are, and the rock of their preset.
         let mut fine = Drawer::new(bench, preset, larger(bench.size, SAMPLES), 1024)?;
         let mut converged = Vec::new();
-        for view in [view, flown(&view, FRAMES[1])] {
+        for view in [view, flown(&field, &view, FRAMES[1])] {
             fine.frame(bench, &view)?;
             converged.push(shown(&fine.read(bench)?.0.averaged(SAMPLES as usize)?));
         }
@@ -394,7 +396,7 @@ fn line(bench: &Bench, name: &str, plan: &Plan) -> Result<Line, CliError> {
         }
         entry.psnr = psnr(&shown(&joining.read(bench)?.0), &converged[0]);
         for frame in 1..=FRAMES[1] {
-            let [baked, drawn] = joining.frame(bench, &flown(&view, frame))?;
+            let [baked, drawn] = joining.frame(bench, &flown(&field, &view, frame))?;
             entry.bakes.push(baked);
             entry.flown.push(drawn);
         }
@@ -428,8 +430,76 @@ fn line(bench: &Bench, name: &str, plan: &Plan) -> Result<Line, CliError> {
     })
 }
 
-/// The view after some frames of the flight.
-fn flown(view: &View, frame: usize) -> View {
+/// Hits that `high` draws on the given views, and the milliseconds of its draws of all pixels: nothing else is measured.
+///
+/// # Errors
+/// As [`run`].
+pub fn hits(
+    bench: &Bench,
+    plan: &Plan,
+    progress: &mut dyn FnMut(&str),
+) -> Result<String, CliError> {
+    let mut judged = Vec::new();
+    let mut times = String::new();
+    for name in &plan.views {
+        progress(name);
+        let job = thesis(bench, name)?;
+        let view = job.view(0.0, bench.size)?;
+        let mut drawer = Drawer::new(bench, PRESETS[0], bench.size, 0)?;
+        drawer.frame(bench, &view)?;
+        let draws: Vec<f64> = (0..plan.rounds)
+            .map(|_| Ok(drawer.frame(bench, &view)?[1]))
+            .collect::<Result<_, CliError>>()?;
+        times += &format!("- {name}: {:.1} ms\n", middle(&draws));
+        let (rays, found, angle) = drawn_hits(bench, &drawer, &view)?;
+        let land = Land::named("thesis")?;
+        let columns = bench.size.width as usize;
+        judged.push((
+            name.clone(),
+            hit_errors(&land, &rays, columns, angle, &found)?,
+        ));
+    }
+    let rows = hit_rows(judged.iter().map(|(name, h)| (name.as_str(), h)));
+    Ok(format!(
+        "{}\nDraws of all pixels by `high`:\n\n{times}",
+        table(&rows)
+    ))
+}
+
+/// The table of hits.
+fn hit_rows<'a>(judged: impl Iterator<Item = (&'a str, &'a HitErrors)>) -> Vec<Vec<String>> {
+    let head = [
+        "View",
+        "rays",
+        "hits",
+        "wrong [%]",
+        "at the silhouette [%]",
+        "median",
+        "95 %",
+        "99 %",
+    ];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for (view, h) in judged {
+        let percent = |n: usize| format!("{:.3}", 100.0 * n as f64 / h.rays.max(1) as f64);
+        rows.push(vec![
+            view.to_owned(),
+            h.rays.to_string(),
+            h.across.len().to_string(),
+            percent(h.wrong),
+            percent(h.at_silhouette),
+            format!("{:.3}", h.centile(0.5)),
+            format!("{:.3}", h.centile(0.95)),
+            format!("{:.3}", h.centile(0.99)),
+        ]);
+    }
+    rows
+}
+
+/// Least height over the ground of the flight (m).
+const LOWEST: f64 = 2.0;
+
+/// The view after some frames of the flight: level, or over the ground where that rises.
+fn flown(field: &Prepared<f64>, view: &View, frame: usize) -> View {
     let forward = view
         .world_from_view
         .transform_vector3(Vec3::NEG_Z)
@@ -439,6 +509,9 @@ fn flown(view: &View, frame: usize) -> View {
     view.eye = view
         .eye
         .moved_by(direction(0.0, azimuth) * (FLIGHT.0 / FLIGHT.1 * frame as f64));
+    let lowest = field.ground(view.eye, 0.0).height + LOWEST;
+    let rise = (lowest - view.eye.altitude()).max(0.0);
+    view.eye = view.eye.moved_by([0.0, rise, 0.0].into());
     view
 }
 
@@ -467,6 +540,7 @@ fn flicker(bench: &Bench, frames: usize) -> Result<Flicker, CliError> {
         height: bench.size.height / 2,
     };
     let samples = SAMPLES;
+    let field = Land::named("thesis")?.field.prepare()?;
     let job = thesis(bench, "V01")?;
     let mut view = job.view(0.0, small)?;
     view.look(0.0, -0.1, 60_f32.to_radians(), small.aspect() as f32);
@@ -483,7 +557,7 @@ fn flicker(bench: &Bench, frames: usize) -> Result<Flicker, CliError> {
     }
     let mut shown = Vec::new();
     for frame in 0..frames {
-        let view = flown(&view, frame);
+        let view = flown(&field, &view, frame);
         let mut both = Vec::new();
         for (renderer, by) in renderers.iter_mut().zip([1, samples]) {
             renderer.draw(&view, Tiling::Adaptive, &mut |_| {})?;
@@ -508,7 +582,7 @@ fn flicker(bench: &Bench, frames: usize) -> Result<Flicker, CliError> {
         let mut fine = Drawer::new(bench, preset, larger(small, samples), 1024)?;
         let mut shown = Vec::new();
         for frame in 0..frames {
-            let view = flown(&view, frame);
+            let view = flown(&field, &view, frame);
             once.frame(bench, &view)?;
             fine.frame(bench, &view)?;
             let truth = fine.read(bench)?.0.averaged(samples as usize)?;
@@ -644,34 +718,7 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
             format!("`{preset}` {:.3}", all / thesis)
         })
         .collect();
-    let mut hits = vec![
-        [
-            "View",
-            "rays",
-            "hits",
-            "wrong [%]",
-            "at the silhouette [%]",
-            "median",
-            "95 %",
-            "99 %",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
-    ];
-    for l in &report.lines {
-        let h = &l.hits;
-        let percent = |n: usize| format!("{:.3}", 100.0 * n as f64 / h.rays.max(1) as f64);
-        hits.push(vec![
-            l.view.clone(),
-            h.rays.to_string(),
-            h.across.len().to_string(),
-            percent(h.wrong),
-            percent(h.at_silhouette),
-            format!("{:.3}", h.centile(0.5)),
-            format!("{:.3}", h.centile(0.95)),
-            format!("{:.3}", h.centile(0.99)),
-        ]);
-    }
+    let hits = hit_rows(report.lines.iter().map(|l| (l.view.as_str(), &l.hits)));
     let flight = report.flicker.as_ref().map_or(String::new(), |f| {
         let list: Vec<String> = PRESETS
             .iter()

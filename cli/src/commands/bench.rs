@@ -66,6 +66,9 @@ pub struct BenchArgs {
     /// Width and height in pixels [default: 256x144; presets 128x72]
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
+    /// Of the terrain only where rays hit, and what a draw takes
+    #[arg(long)]
+    pub hits: bool,
     /// Seconds of the flight of chapter 6 [default: 60]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     pub seconds: Option<u32>,
@@ -126,6 +129,9 @@ impl BenchArgs {
         }
         if let Some(clock) = self.clock {
             line += &format!(" --clock {}", lower(format!("{clock:?}")));
+        }
+        if self.hits {
+            line += " --hits";
         }
         for set in &self.sets {
             line += &format!(" --set {set}");
@@ -206,6 +212,12 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
             as_given(&args.of),
             others(&[Subject::Presets]),
             "left out, or the subject `presets`",
+        ),
+        (
+            "--hits",
+            args.hits.then(|| "given".to_owned()),
+            others(&[Subject::Terrain]),
+            "left out, or the subject `terrain`",
         ),
         (
             "--seconds",
@@ -352,6 +364,15 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 rounds: rounds.least,
                 frames: if args.views.is_empty() { 60 } else { 0 },
             };
+            if args.hits {
+                let text = terrain::hits(&bench, &plan, &mut progress)?;
+                bar.finish_and_clear();
+                print!("{text}");
+                return match &args.out {
+                    Some(path) => write_text(path, &text),
+                    None => Ok(()),
+                };
+            }
             let report = terrain::run(&bench, &plan, &mut progress)?;
             bar.finish_and_clear();
             let text = terrain::markdown(&bench, &report, &command);

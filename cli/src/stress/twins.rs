@@ -86,6 +86,10 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "rays_over_baked_heights_meet_the_field",
     ),
     (
+        "veduta::terrain::refine::found_hit",
+        "a_long_lens_meets_crests_that_are_finer_than_texels",
+    ),
+    (
         "veduta::terrain::refine::refined_hit",
         "rays_over_baked_heights_meet_the_field",
     ),
