@@ -70,7 +70,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
         "cloud_tile" => {
-            let kinds = [vec![], vec!["CLOUD_SHAPED"], vec!["CLOUD_COARSE"]];
+            let kinds = [vec![], vec!["CLOUD_SHAPED"]];
             return [vec![], vec!["CLOUD_WIDE"]]
                 .iter()
                 .flat_map(|bits| kinds.iter().map(move |kind| [&kind[..], bits].concat()))

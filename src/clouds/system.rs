@@ -13,9 +13,6 @@ use crate::programs::blocks::CloudDraw as DrawBlock;
 use crate::settings::Preset;
 use crate::view::View;
 
-/// Share of a pixel's width that a level of detail stands for: a pixel that covers more than 9 texels of the tile reads the next coarser level, and so on by twos.
-const MINIFIED: f32 = 0.15;
-
 /// Light that falls on the clouds, in the picture's own unit. A host that has an atmosphere takes it from its `SkyQuery`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CloudLights {
@@ -156,6 +153,8 @@ pub struct CloudsOptions {
     pub far: f64,
     /// Whether the host's depth buffer hides clouds; [`Clouds::set_host`] tells it.
     pub over_depth: bool,
+    /// Whether tile and place are kept up for views that cannot show the layer too, so that [`Clouds::shadow`] is that of every eye.
+    pub shadows: bool,
     /// The air before the clouds, if they are to show it to eyes within the air; to those above it clouds show none: [`Clouds::set_air`] tells the tables of the sky that it is taken from. The picture below must have its air in it already.
     pub air: Option<Atmosphere>,
     /// Which light: scattered once, with what comes from sky and ground scattered without shadows; or any number of times, of all three.
@@ -170,6 +169,7 @@ impl Default for CloudsOptions {
             deck: CloudDeck::default(),
             far: 80_000.0,
             over_depth: false,
+            shadows: false,
             air: None,
             orders: Orders::All,
         }
@@ -219,6 +219,8 @@ pub struct Clouds {
     held: Vec<u8>,
     host: Option<wgpu::TextureView>,
     over_depth: bool,
+    /// Whether tile and place are kept up for shadows.
+    shadows: bool,
     /// Flags of the program for the air that is shown; none without.
     air_features: Option<&'static [&'static str]>,
     /// The tables of the sky, the colour of its sun and the thickness of the air (m).
@@ -234,7 +236,7 @@ pub struct Clouds {
     /// Whether the first tile was baked in this frame.
     fresh: bool,
     /// Fields of `CloudTile` for the last eye.
-    placed: Option<[f32; 12]>,
+    placed: Option<[f32; 11]>,
     seen: bool,
 }
 
@@ -258,7 +260,7 @@ pub struct CloudShadow<'a> {
     /// Its sampler, which filters.
     pub sampler: &'a wgpu::Sampler,
     /// The fields of `CloudTile` in their order, for positions relative to the eye of the last [`Clouds::prepare`]; anew after each.
-    pub layer: [f32; 12],
+    pub layer: [f32; 11],
 }
 
 impl Clouds {
@@ -489,6 +491,7 @@ impl Clouds {
             held: Vec::new(),
             host: None,
             over_depth: options.over_depth,
+            shadows: options.shadows,
             air_features,
             air: None,
             groups: Vec::new(),
@@ -570,12 +573,16 @@ impl Clouds {
     /// Tells width and height of the host's picture to clouds of [`CloudQuality::half`]; [`Clouds::set_host`] does it by the depth buffer. Again after each change of size.
     ///
     /// # Errors
-    /// [`Error::OutOfDomain`] for clouds without `half`, and for a size that the device's textures cannot have.
+    /// [`Error::OutOfDomain`] for clouds without `half`, for a size that the device's textures cannot have, and over a depth buffer that [`Clouds::set_host`] has not told.
     pub fn set_size(&mut self, device: &wgpu::Device, size: [u32; 2]) -> Result<(), Error> {
         let most = device.limits().max_texture_dimension_2d;
         if !size.iter().all(|n| (1..=most).contains(n)) {
             let domain = format!("each in [1, {most}] pixels");
             return Err(fault("size", format!("{size:?}"), &domain));
+        }
+        if self.over_depth && self.host.is_none() {
+            let domain = "a depth buffer, told with `set_host`, which tells the size too";
+            return Err(fault("host", "none", domain));
         }
         let Some(half) = &mut self.half else {
             let domain = "true for clouds that are told a size";
@@ -658,10 +665,10 @@ impl Clouds {
         Ok(())
     }
 
-    /// What hosts need to shade their own things; none before the first [`Clouds::prepare`] of a view that can show the layer, and for a layer without clouds, whose
-    /// shadow is 1 everywhere. Straight light alone: what the clouds scatter down is not in it.
+    /// What hosts need to shade their own things, for the eye of the last [`Clouds::prepare`]; none before the first, for a layer without clouds, whose shadow is 1 everywhere, and without
+    /// [`CloudsOptions::shadows`] for a view that cannot show the layer. Straight light alone: what the clouds scatter down is not in it.
     pub fn shadow(&self) -> Option<CloudShadow<'_>> {
-        let (shown, _) = self.shown?;
+        let (shown, _) = self.shown.filter(|_| self.seen || self.shadows)?;
         Some(CloudShadow {
             tile: &self.tile.views[shown],
             sampler: &self.tile.sampler,
@@ -739,7 +746,7 @@ impl Clouds {
         let eye = view.eye.normalized();
         self.seen = !self.deck.is_empty() && self.may_show(eye.altitude(), [middle, right, up]);
         let mut work = Work::default();
-        if !self.seen {
+        if self.deck.is_empty() || !(self.seen || self.shadows) {
             // The way of the sun meanwhile is not that of a frame.
             self.last_sun = None;
             return Ok(work);
@@ -814,8 +821,6 @@ impl Clouds {
                 0.0
             },
             clear: deck.clear_way() as f32,
-            detail: MINIFIED * self.tile.texels[self.shown.map_or(0, |s| s.0)] as f32
-                / period as f32,
             least: self.tile.least,
             // The same for one projection, and as good as any for each of those that frames are shifted by.
             start: if self.quality.jitter {
@@ -845,7 +850,6 @@ impl Clouds {
             block.levels,
             block.extinction,
             block.clear,
-            block.detail,
             block.least,
         ]);
         let bytes = block.to_bytes().to_vec();

@@ -13,12 +13,9 @@ pub const LOWEST_SUN: f32 = 0.121_869;
 /// Rows that are baked at once: what the buffer between program and texture holds.
 const ROWS: u32 = 8;
 
-/// Levels of detail beside the finest, of textures whose levels of height are a multiple of 8.
-const COARSE: u32 = 3;
-
-/// Bytes of a row of a level of detail in the buffer: copies want multiples of 256.
-fn row_bytes(texel: u32, texels: u32, detail: u32) -> u32 {
-    (texel * (texels >> detail)).next_multiple_of(256)
+/// Bytes of a row in the buffer: copies want multiples of 256.
+fn row_bytes(texel: u32, texels: u32) -> u32 {
+    (texel * texels).next_multiple_of(256)
 }
 
 /// Textures of a layer with what bakes them.
@@ -34,8 +31,6 @@ pub(super) struct Tile {
     pub views: Vec<wgpu::TextureView>,
     textures: Vec<wgpu::Texture>,
     pipeline: wgpu::ComputePipeline,
-    /// Makes the coarser levels of detail.
-    reduce: Vec<wgpu::ComputePipeline>,
     slots: Vec<(wgpu::Buffer, wgpu::BindGroup)>,
     target: wgpu::BindGroup,
     staging: wgpu::Buffer,
@@ -66,14 +61,6 @@ impl Tile {
         let texel = if wide { 4 } else { 2 };
         let flags = [deck.flags(), bits].concat();
         let (pipeline, layouts) = compute(device, programs, "cloud_tile", &flags, &[])?;
-        let details = if levels.is_multiple_of(8) { COARSE } else { 0 };
-        let reduce = (1..=details)
-            .map(|detail| {
-                let constants = [("CLOUD_DETAIL", f64::from(detail))];
-                let flags = [&["CLOUD_COARSE"], bits].concat();
-                Ok(compute(device, programs, "cloud_tile", &flags, &constants)?.0)
-            })
-            .collect::<Result<_, Error>>()?;
         let textures: Vec<wgpu::Texture> = texels
             .iter()
             .map(|&texels| {
@@ -84,7 +71,7 @@ impl Tile {
                         height: texels,
                         depth_or_array_layers: levels,
                     },
-                    mip_level_count: 1 + details,
+                    mip_level_count: 1,
                     sample_count: 1,
                     dimension: wgpu::TextureDimension::D3,
                     format: if wide {
@@ -107,9 +94,7 @@ impl Tile {
         };
         use wgpu::BufferUsages as Usage;
         let staging = buffer(
-            (0..=details)
-                .map(|m| u64::from(row_bytes(texel, most, m) * (ROWS >> m) * (levels >> m)))
-                .sum(),
+            u64::from(row_bytes(texel, most) * ROWS * levels),
             Usage::STORAGE | Usage::COPY_SRC,
         );
         let group = |layout, buffer: &wgpu::Buffer| {
@@ -140,7 +125,6 @@ impl Tile {
                 .collect(),
             textures,
             pipeline,
-            reduce,
             slots,
             target: group(&layouts[2], &staging),
             staging,
@@ -167,18 +151,11 @@ impl Tile {
 
     pub fn texture_bytes(&self) -> u64 {
         let texels = |n: &u32| u64::from(*n) * u64::from(*n);
-        let finest =
-            u64::from(self.texel * self.levels) * self.texels.iter().map(texels).sum::<u64>();
-        (0..=self.details()).map(|m| finest >> (3 * m)).sum()
+        u64::from(self.texel * self.levels) * self.texels.iter().map(texels).sum::<u64>()
     }
 
     pub fn buffer_bytes(&self) -> u64 {
         self.staging.size() + self.slots.len() as u64 * RowsBlock::SIZE as u64
-    }
-
-    /// Levels of detail beside the finest.
-    fn details(&self) -> u32 {
-        self.reduce.len() as u32
     }
 
     /// Records the baking of a part of one of the textures.
@@ -230,44 +207,32 @@ impl Tile {
             pass.set_bind_group(0, bound, &[]);
             pass.set_bind_group(2, &self.target, &[]);
             pass.dispatch_workgroups((texels * rows * self.texel / 4).div_ceil(64), 1, 1);
-            for (reduce, detail) in self.reduce.iter().zip(1..) {
-                let words = (texels * rows * self.levels * self.texel / 4) >> (3 * detail);
-                pass.set_pipeline(reduce);
-                pass.dispatch_workgroups(words.div_ceil(64), 1, 1);
-            }
         }
-        let mut offset = 0;
-        for detail in 0..=self.details() {
-            let (bytes, rows) = (row_bytes(self.texel, texels, detail), rows >> detail);
-            let levels = self.levels >> detail;
-            encoder.copy_buffer_to_texture(
-                wgpu::TexelCopyBufferInfo {
-                    buffer: &self.staging,
-                    layout: wgpu::TexelCopyBufferLayout {
-                        offset,
-                        bytes_per_row: Some(bytes),
-                        rows_per_image: Some(rows),
-                    },
+        encoder.copy_buffer_to_texture(
+            wgpu::TexelCopyBufferInfo {
+                buffer: &self.staging,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(row_bytes(self.texel, texels)),
+                    rows_per_image: Some(rows),
                 },
-                wgpu::TexelCopyTextureInfo {
-                    mip_level: detail,
-                    origin: wgpu::Origin3d {
-                        x: 0,
-                        y: first >> detail,
-                        z: 0,
-                    },
-                    ..self.textures[texture].as_image_copy()
+            },
+            wgpu::TexelCopyTextureInfo {
+                origin: wgpu::Origin3d {
+                    x: 0,
+                    y: first,
+                    z: 0,
                 },
-                wgpu::Extent3d {
-                    width: texels >> detail,
-                    height: rows,
-                    depth_or_array_layers: levels,
-                },
-            );
-            offset += u64::from(bytes * rows * levels);
-        }
+                ..self.textures[texture].as_image_copy()
+            },
+            wgpu::Extent3d {
+                width: texels,
+                height: rows,
+                depth_or_array_layers: self.levels,
+            },
+        );
         Work {
-            dispatches: 1 + self.details(),
+            dispatches: 1,
             writes: 1,
             bytes: bytes.len() as u64,
             ..Work::default()

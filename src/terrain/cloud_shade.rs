@@ -12,11 +12,11 @@ pub(super) struct CloudShade {
     /// The tile that is bound; none for the clear one.
     tile: Option<wgpu::TextureView>,
     pub group: wgpu::BindGroup,
-    held: [f32; 12],
+    held: [f32; 11],
 }
 
 /// The fields of `CloudTile` for no clouds: everything is lit by the one texel of the clear tile.
-const CLEAR: [f32; 12] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0];
+const CLEAR: [f32; 11] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
 impl CloudShade {
     pub fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> CloudShade {
@@ -45,7 +45,7 @@ impl CloudShade {
             layer,
             clear,
             tile: None,
-            held: [0.0; 12],
+            held: [0.0; 11],
         }
     }
 

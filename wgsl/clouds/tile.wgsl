@@ -26,27 +26,23 @@ struct CloudTile {
     extinction: f32,
     /// Way that is free of clouds for each unit that the tile's density is below 0 [m].
     clear: f32,
-    /// A sample at a distance of d metres reads the tile's level of detail log2(d coarse) [1/m]; 0 for the finest always.
-    coarse: f32,
     /// The least density that the tile tells [1].
     least: f32,
 }
 
-/// Density before its cut at 0 and optical depth to the sun at a point given relative to the eye, whose altitude is `altitude`, `distance` from
-/// the eye.
+/// Density before its cut at 0 and optical depth to the sun at a point given relative to the eye, whose altitude is `altitude`.
 ///
 /// domain  relative in [-1e5, 1e5] m lin
 /// domain  altitude in [4000, 5500] m lin
-/// domain  distance in [0, 1e5] m lin
 /// range   [-1e3, 6.5e4] 1
 /// error   2e-2 abs of reference::clouds::uncut_density
 /// outside undefined
 /// source  ours
-fn tile_at(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: vec2<f32>, altitude: f32, distance: f32) -> vec2<f32> {
+fn tile_at(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: vec2<f32>, altitude: f32) -> vec2<f32> {
     let above = clamp(altitude - layer.bottom, 0.0, layer.thickness);
     let place = layer.place + (relative - layer.shear * above) * layer.tiles_per_metre;
     let level = (above / max(layer.thickness, 1e-3) * (layer.levels - 1.0) + 0.5) / layer.levels;
-    return tile_value(textureSampleLevel(tile, linear, vec3<f32>(place, level), log2(max(distance * layer.coarse, 1.0))).xy, layer.least);
+    return tile_value(textureSampleLevel(tile, linear, vec3<f32>(place, level), 0.0).xy, layer.least);
 }
 
 /// Share of the sun's light that the layer lets straight through to a point given relative to the eye, below, inside or above it.
@@ -60,7 +56,7 @@ fn tile_at(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: v
 fn cloud_shadow(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: vec2<f32>, altitude: f32) -> f32 {
     // Where the sun's ray meets the layer.
     let met = clamp(altitude, layer.bottom, layer.bottom + layer.thickness);
-    return exp(-tile_at(tile, linear, layer, relative + layer.shear * (met - altitude), met, 0.0).y);
+    return exp(-tile_at(tile, linear, layer, relative + layer.shear * (met - altitude), met).y);
 }
 
 /// Light of all orders along a ray through the layer, in parts that light and phase function weigh.
@@ -162,7 +158,7 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
     let path = tile_path(layer, ground_radius, eye_altitude, dir, max_distance, steps);
     let deepest = -log(max(min_transmittance, 1e-20)) / max(kept, 1e-3);
     var t = segment_distance(path.segment, 0.0);
-    var here = tile_at(tile, linear, layer, dir.xz * t, path_altitude(path, t), t);
+    var here = tile_at(tile, linear, layer, dir.xz * t, path_altitude(path, t));
     var depth = 0.0;
     var reach = here.y;
     var lit = exp(-vec2<f32>(1.0, kept) * reach);
@@ -177,7 +173,7 @@ fn march_tile_orders(tile: texture_3d<f32>, cells: texture_3d<f32>, linear: samp
         s = min(s + stride * max(path.even * (2.0 - left), -layer.clear * here.x), path.size);
         stride = 1.0;
         let at = segment_distance(path.segment, s);
-        let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at), at);
+        let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at));
         let added = mean_density(here.x, next.x) * layer.extinction * (at - t);
         depth += added;
         let ahead = depth + next.y;
@@ -220,7 +216,7 @@ fn march_tile(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, ground_r
     let path = tile_path(layer, ground_radius, eye_altitude, dir, max_distance, steps);
     let deepest = -log(max(min_transmittance, 1e-20));
     var t = segment_distance(path.segment, 0.0);
-    var here = tile_at(tile, linear, layer, dir.xz * t, path_altitude(path, t), t);
+    var here = tile_at(tile, linear, layer, dir.xz * t, path_altitude(path, t));
     var depth = 0.0;
     var left = 1.0;
     var lit = exp(-here.y);
@@ -235,7 +231,7 @@ fn march_tile(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, ground_r
         s = min(s + stride * max(path.even * (2.0 - left), -layer.clear * here.x), path.size);
         stride = 1.0;
         let at = segment_distance(path.segment, s);
-        let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at), at);
+        let next = tile_at(tile, linear, layer, dir.xz * at, path_altitude(path, at));
         let added = mean_density(here.x, next.x) * layer.extinction * (at - t);
         depth += added;
         // Light at the end of the step, and its mean: the logarithmic one.

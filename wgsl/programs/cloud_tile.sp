@@ -1,17 +1,15 @@
 Bakes rows of the tile of a cloud layer: every column follows a ray to the sun, so that depths are sums along it. One invocation two columns, which share
-words. With CLOUD_COARSE, a coarser level of detail of the rows that have been baked; one invocation two texels.
+words; with CLOUD_WIDE one.
 
 #PROGRAM{ cloud_tile }#
 
 #COMPUTE{
     #CODE{
 #ifdef CLOUD_WIDE
-#import veduta::math::half::{half_word, half_pair}
-#endif
-#ifdef CLOUD_COARSE
-#import veduta::clouds::code::{tile_code, tile_value}
+#import veduta::math::half::{half_word}
 #else
 #import veduta::clouds::code::{tile_code}
+#endif
 #ifdef CLOUD_SHAPED
 #import veduta::clouds::field::{CloudLayer}
 #import veduta::clouds::shape::{CloudShape, shaped_density}
@@ -19,7 +17,6 @@ words. With CLOUD_COARSE, a coarser level of detail of the rows that have been b
 #import veduta::clouds::field::{CloudLayer, uncut_density}
 #endif
 #import veduta::clouds::integral::{mean_density}
-#endif
 
 struct TileRows {
     // Horizontal way of the sun's ray per metre of height.
@@ -61,10 +58,6 @@ fn word_of(codes: vec4<f32>) -> u32 {
     return half_word(codes.xy);
 }
 
-fn codes_of(word: u32) -> vec4<f32> {
-    return vec4<f32>(half_pair(word), 0.0, 0.0);
-}
-
 fn code_of(density: f32, depth: f32) -> vec2<f32> {
     return vec2<f32>(density, min(depth, 6e4));
 }
@@ -76,58 +69,11 @@ fn word_of(codes: vec4<f32>) -> u32 {
     return pack4x8unorm(codes);
 }
 
-fn codes_of(word: u32) -> vec4<f32> {
-    return unpack4x8unorm(word);
-}
-
 fn code_of(density: f32, depth: f32) -> vec2<f32> {
     return tile_code(density, depth, tile.least);
 }
 #endif
 
-// Words in a row of a level of detail: rows of copies begin at multiples of 256 bytes.
-fn row_words(detail: u32) -> i32 {
-    return ((tile.texels >> detail) + 64 * TEXELS - 1) / (64 * TEXELS) * 64;
-}
-
-// Word of a place: column of words, level of height, row.
-fn word_at(detail: u32, at: vec3<i32>) -> i32 {
-    var start = 0;
-    for (var m = 0u; m < detail; m++) {
-        start += row_words(m) * (tile.rows >> m) * (tile.levels >> m);
-    }
-    return start + (at.y * (tile.rows >> detail) + at.z) * row_words(detail) + at.x;
-}
-
-#ifdef CLOUD_COARSE
-override CLOUD_DETAIL: i32 = 1;
-
-// Of eight texels the mean density after its cut, or before it where there is no cloud; and the mean depth.
-@compute @workgroup_size(64)
-fn reduce(@builtin(global_invocation_id) id: vec3<u32>) {
-    let detail = u32(CLOUD_DETAIL);
-    let size = vec3<i32>((tile.texels >> detail) / TEXELS, tile.levels >> detail, tile.rows >> detail);
-    let index = i32(id.x);
-    if index >= size.x * size.y * size.z {
-        return;
-    }
-    let at = vec3<i32>(index % size.x, index / size.x % size.y, index / (size.x * size.y));
-    var codes = vec4<f32>(0.0);
-    for (var side = 0; side < TEXELS; side++) {
-        var sum = vec3<f32>(0.0);
-        for (var k = 0; k < 8; k++) {
-            // Of each pair of texels the left and the right one.
-            let place = 2 * (TEXELS * at.x + side) + (k & 1);
-            let pair = codes_of(texels[word_at(detail - 1u, vec3<i32>(place / TEXELS, 2 * at.yz + vec2<i32>((k >> 1u) & 1, k >> 2u)))]);
-            let texel = tile_value(select(pair.xy, pair.zw, place % TEXELS == 1), tile.least);
-            sum += vec3<f32>(max(texel.x, 0.0), texel);
-        }
-        let code = code_of(0.125 * select(sum.y, sum.x, sum.x > 0.0), 0.125 * sum.z);
-        codes = select(vec4<f32>(codes.xy, code), vec4<f32>(code, 0.0, 0.0), side == 0);
-    }
-    texels[word_at(detail, at)] = word_of(codes);
-}
-#else
 @compute @workgroup_size(64)
 fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     let across = tile.texels / TEXELS;
@@ -171,9 +117,10 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
                 codes = vec4<f32>(codes.xy, code);
             }
         }
-        texels[word_at(0u, vec3<i32>(i, j, row))] = word_of(codes);
+        // Rows of copies begin at multiples of 256 bytes.
+        let words = (tile.texels + 64 * TEXELS - 1) / (64 * TEXELS) * 64;
+        texels[(j * tile.rows + row) * words + i] = word_of(codes);
     }
 }
-#endif
     }#
 }#

@@ -7,6 +7,7 @@ use veduta::temporal::{Temporal, TemporalOptions};
 use veduta::terrain::{Land, Terrain, TerrainLights, TerrainOptions};
 use veduta::{Preset, Targets, Value, View, wgpu};
 
+use super::terrain::{part, taken};
 use super::timing::{Middle, Ratio};
 use super::{Bench, decibels, table};
 use crate::commands::render::Job;
@@ -202,6 +203,7 @@ impl<'a> Frame<'a> {
                     taken: [fine.taken.width, fine.taken.height],
                     size: [size.width, size.height],
                     bound: f32::INFINITY,
+                    sharp: fine.preset != "low",
                     ..TemporalOptions::of([size.width, size.height])
                 };
                 let mut temporal = Temporal::new(device, programs, &options)?;
@@ -467,20 +469,6 @@ impl Tone {
     }
 }
 
-/// What of the pixels a side a preset draws before frames are joined, as it is written.
-fn part(preset: &str) -> &'static str {
-    if preset == "low" { "1/2" } else { "2/3" }
-}
-
-fn taken(preset: &str, size: Size) -> Size {
-    let ratio = if preset == "low" { 2.0 } else { 1.5 };
-    let less = |n: u32| (f64::from(n) / ratio).round() as u32;
-    Size {
-        width: less(size.width),
-        height: less(size.height),
-    }
-}
-
 /// The converged clouds: a finer tile, finer cells and more steps of the same system.
 fn converged() -> CloudQuality {
     CloudQuality {
@@ -492,6 +480,7 @@ fn converged() -> CloudQuality {
         second_tile: false,
         frames: 8,
         cells: [64, 32],
+        wide: true,
         ..CloudQuality::of(&Preset::High)
     }
 }

@@ -288,12 +288,12 @@ fn thesis(bench: &Bench, view: &str) -> Result<Job, CliError> {
 }
 
 /// What of the pixels a side a preset draws before frames are joined, as it is written.
-fn part(preset: &str) -> &'static str {
+pub(super) fn part(preset: &str) -> &'static str {
     if preset == "low" { "2/5" } else { "1/2" }
 }
 
 /// The picture that a preset draws for one of this size.
-fn taken(preset: &str, size: Size) -> Size {
+pub(super) fn taken(preset: &str, size: Size) -> Size {
     let ratio = if preset == "low" { 2.5 } else { 2.0 };
     let less = |n: u32| (f64::from(n) / ratio).round() as u32;
     Size {

@@ -200,8 +200,8 @@ fn the_bench_of_the_terrain_has_its_tables() {
     let text = std::fs::read_to_string(dir.join("t.md")).unwrap();
     assert!(said.out.contains("# What the terrain costs"));
     for head in [
-        "`high` joined from 2/3 [ms]",
-        "`low` joined from 1/2 [ms]",
+        "`high` joined from 1/2 [ms]",
+        "`low` joined from 2/5 [ms]",
         "/ thesis",
         "flight [ms]",
         "baked",
