@@ -50,7 +50,7 @@ pub struct GroundState {
     pub rows: usize,
     /// [`CHANNELS`] numbers a cell, cells by rows.
     pub cells: Vec<f32>,
-    /// Whether discharges were given; else they follow from speeds.
+    /// Whether discharges were given; else, and where all of them are 0, they follow from speeds: a state of `Source` has none.
     pub has_discharges: bool,
 }
 
@@ -135,24 +135,36 @@ impl GroundState {
     }
 
     /// The channels of the cell at a column and row.
+    ///
+    /// # Panics
+    /// When the row is not below `rows`, or the cell lies beyond the end of `cells`. A column beyond `columns` is one of a later row.
     pub fn cell(&self, x: usize, z: usize) -> &[f32] {
         let at = (z * self.columns + x) * CHANNELS;
         &self.cells[at..at + CHANNELS]
     }
 
     /// The channels of the cell at a column and row, to change.
+    ///
+    /// # Panics
+    /// As [`GroundState::cell`].
     pub fn cell_mut(&mut self, x: usize, z: usize) -> &mut [f32] {
         let at = (z * self.columns + x) * CHANNELS;
         &mut self.cells[at..at + CHANNELS]
     }
 
     /// Height of the ground (m).
+    ///
+    /// # Panics
+    /// As [`GroundState::cell`].
     pub fn ground(&self, x: usize, z: usize) -> f64 {
         let c = self.cell(x, z);
         f64::from(c[0]) + f64::from(c[8]) + f64::from(c[9])
     }
 
     /// Depth of the water (m).
+    ///
+    /// # Panics
+    /// As [`GroundState::cell`].
     pub fn water(&self, x: usize, z: usize) -> f64 {
         let c = self.cell(x, z);
         f64::from(c[1]) + f64::from(c[10])

@@ -12,10 +12,13 @@ use crate::program::ProgramSet;
 const CONTROL: usize = 16;
 const BOOK: usize = 12;
 
+/// Grounds made so far.
+static GROUNDS: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
+
 /// Cells along an edge of a tile.
 const TILE: usize = 32;
 
-/// Sums of what happened since the ground was made or its state set. Depths summed over cells (m).
+/// Sums of what happened since the ground was made or its state set. Depths summed over cells (m). Water that [`Tool::Water`] adds or takes is in none of them: who edits keeps that book.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GroundReport {
     /// Rained and sprung up.
@@ -165,7 +168,7 @@ pub enum Tool {
         /// Wavelength (cells), in [1, 4096].
         wavelength: f32,
     },
-    /// Adds water (m), or takes it away, no more than there is.
+    /// Adds water (m), or takes it away, no more than there is. No sum of [`GroundReport`] counts it.
     Water,
     /// Moves the ground by a share (the strength) towards a height.
     Flatten {
@@ -179,13 +182,13 @@ pub enum Tool {
 pub struct GroundEdit {
     /// What is done.
     pub tool: Tool,
-    /// Column of the cursor.
+    /// Column of the cursor, in [-1e5, 1e5]; where the boundary is `Periodic` it reaches over the edges.
     pub x: f32,
-    /// Row of the cursor.
+    /// Row of the cursor, in the same way.
     pub z: f32,
     /// Radius (cells), in [0, 1e4]; `None`: everywhere, without fading.
     pub radius: Option<f32>,
-    /// Metres or share, in [-1e4, 1e4].
+    /// Metres, in [-1e4, 1e4]; of `Smooth` and `Flatten` a share, in [0, 1].
     pub strength: f32,
     /// Seed of noise.
     pub seed: u32,
@@ -200,7 +203,9 @@ impl GroundEdit {
         within("edit.x", self.x, -1e5, 1e5)?;
         within("edit.z", self.z, -1e5, 1e5)?;
         within("edit.radius", self.radius.unwrap_or(0.0), 0.0, 1e4)?;
-        within("edit.strength", self.strength, -1e4, 1e4)?;
+        let share = matches!(self.tool, Tool::Smooth | Tool::Flatten { .. });
+        let [least, most] = if share { [0.0, 1.0] } else { [-1e4, 1e4] };
+        within("edit.strength", self.strength, least, most)?;
         match self.tool {
             Tool::Noise { wavelength } => within("edit.wavelength", wavelength, 1.0, 4096.0),
             Tool::Flatten { height } => within("edit.height", height, -1e5, 1e5),
@@ -226,6 +231,8 @@ pub struct GroundPoint {
 #[derive(Debug)]
 pub struct GroundQuery {
     staging: wgpu::Buffer,
+    /// Of which ground.
+    ground: u64,
     /// Changes that were recorded before it: states and edits.
     state: u64,
     edits: u64,
@@ -236,12 +243,19 @@ impl GroundQuery {
     /// The answer in the order of the places, when the device has it; `None` before. Waits for nothing; call it after the submission, each frame.
     ///
     /// # Errors
-    /// [`Error::Device`].
+    /// [`Error::Device`]; [`Error::OutOfDomain`] for another ground than that which was asked: the answer stays for its own.
     pub fn take(
         &mut self,
         device: &wgpu::Device,
         ground: &mut Ground,
     ) -> Result<Option<Vec<GroundPoint>>, Error> {
+        if ground.identity != self.ground {
+            return Err(Error::OutOfDomain {
+                name: "ground.query".to_owned(),
+                value: format!("of ground {}", self.ground),
+                domain: format!("of the ground that takes it, {}", ground.identity),
+            });
+        }
         let receiver = self.mapped.get_or_insert_with(|| {
             let (sender, receiver) = std::sync::mpsc::channel();
             self.staging
@@ -310,6 +324,8 @@ impl GroundQuery {
 /// ```
 #[derive(Debug)]
 pub struct Ground {
+    /// Which of all that were made.
+    identity: u64,
     options: GroundOptions,
     columns: usize,
     rows: usize,
@@ -548,6 +564,7 @@ impl Ground {
         };
         let (query, extremes) = (pass("ground_query")?, pass("ground_range")?);
         let mut ground = Ground {
+            identity: GROUNDS.fetch_add(1, std::sync::atomic::Ordering::Relaxed),
             options: options.clone(),
             columns,
             rows,
@@ -607,16 +624,18 @@ impl Ground {
         bytes
     }
 
-    /// Changes weather, step and coefficients; scheme, and whether there is erosion, must stay.
+    /// Changes weather, step and coefficients; scheme, and whether there is erosion, must stay. Written by the queue: it holds from the next submission on, also for steps that were recorded before
+    /// and are not submitted yet (see [`Ground::step`]).
     ///
     /// # Errors
-    /// As [`GroundOptions::check`]; [`Error::OutOfDomain`] for another scheme, and for erosion that comes or goes.
+    /// As [`GroundOptions::check`]; [`Error::OutOfDomain`] for another scheme, for erosion that comes or goes, and for springs that reach no cell. The ground stays as it is then.
     pub fn set_options(
         &mut self,
         queue: &wgpu::Queue,
         options: &GroundOptions,
     ) -> Result<(), Error> {
         options.check()?;
+        check_springs(options, self.columns, self.rows)?;
         if options.scheme != self.options.scheme
             || options.erosion.is_some() != self.options.erosion.is_some()
         {
@@ -712,7 +731,10 @@ impl Ground {
         queue.write_buffer(&self.planes.springs, 0, &springs);
     }
 
-    /// Uploads a state of the same size; clock and sums begin anew.
+    /// Uploads a state of the same size; clock and sums begin anew. Heights on the device count from a level that follows from the least and greatest base alone, and which stays until another state
+    /// is set: what digging and edits do to the ground does not move it, so that a state which is saved and set again goes on bit for bit.
+    ///
+    /// Written by the queue, before all that is submitted later: submit what was recorded for the state before it first (see [`Ground::step`]).
     ///
     /// # Errors
     /// [`Error::OutOfDomain`] for another size, and as [`GroundState::from_channels`].
@@ -729,10 +751,14 @@ impl Ground {
         let physical = self.options.scheme == Scheme::Physical;
         let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
         for c in checked.cells.chunks_exact(CHANNELS) {
-            low = low.min(c[0] + c[8]);
-            high = high.max(c[0] + c[8]);
+            low = low.min(c[0]);
+            high = high.max(c[0]);
         }
+        // Of the bases, which nothing changes: a state that is saved and set again counts from the same.
         self.reference = 0.0_f32.clamp(low, high).round();
+        // Of a state of the source's scheme all are 0, though it moves; of this one where it moves they are not.
+        let given = state.has_discharges
+            && (checked.cells.chunks_exact(CHANNELS)).any(|c| c[12] != 0.0 || c[13] != 0.0);
         let plane = self.plane();
         let pair = |first: &dyn Fn(usize, usize) -> f32, second: &dyn Fn(usize, usize) -> f32| {
             let mut numbers = vec![0.0_f32; 2 * plane];
@@ -787,7 +813,7 @@ impl Ground {
                 let rise = level(fx, fz) - level(x, z);
                 let near = (at(x, z, 1) - rise.max(0.0)).max(0.0);
                 let far = (at(fx, fz, 1) - (-rise).max(0.0)).max(0.0);
-                let q = if checked.has_discharges && state.has_discharges {
+                let q = if given {
                     at(x, z, if along_z { 13 } else { 12 })
                 } else {
                     speed.max(0.0) * near + speed.min(0.0) * far
@@ -853,6 +879,10 @@ impl Ground {
     }
 
     /// Records steps; nothing where nothing moves.
+    ///
+    /// Steps and edits act when their encoder is submitted, and the ground counts them when they are recorded: submit every encoder, in the order in which they were recorded, before
+    /// [`Ground::state`], [`Ground::report`], [`Ground::set_state`] or [`Ground::set_options`], which act on the queue at once. An encoder that is dropped leaves the ground a step behind what it believes;
+    /// set its state then.
     pub fn step(&mut self, encoder: &mut wgpu::CommandEncoder, steps: u32) -> Work {
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("veduta ground"),
@@ -1081,6 +1111,7 @@ impl Ground {
         self.record_range(device, encoder, &staging, 0);
         GroundQuery {
             staging,
+            ground: self.identity,
             state: self.states,
             edits: self.edits,
             mapped: None,
@@ -1179,6 +1210,7 @@ impl Ground {
         self.record_range(device, encoder, &staging, found.size());
         Ok(GroundQuery {
             staging,
+            ground: self.identity,
             state: self.states,
             edits: self.edits,
             mapped: None,
@@ -1211,7 +1243,7 @@ impl Ground {
             .collect()
     }
 
-    /// The state, bit for bit. Submits and waits.
+    /// The state, bit for bit, of what has been submitted: steps and edits that are only recorded must be submitted first (see [`Ground::step`]). Submits and waits.
     ///
     /// # Errors
     /// [`Error::Device`].
@@ -1294,11 +1326,11 @@ impl Ground {
             columns: self.columns,
             rows: self.rows,
             cells,
-            has_discharges: true,
+            has_discharges: physical,
         })
     }
 
-    /// What happened since the state was set. Submits and waits.
+    /// What happened since the state was set, of what has been submitted. Submits and waits.
     ///
     /// # Errors
     /// [`Error::Device`].

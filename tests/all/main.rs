@@ -19,6 +19,7 @@ mod globe;
 mod ground;
 mod ground_picture;
 mod ground_rows;
+mod ground_seams;
 mod hash;
 mod land;
 mod landscape;

@@ -191,10 +191,11 @@ fn weather(now: GroundStep, spring: vec4<f32>, water: vec4<f32>, inside: vec4<f3
     return Weather(gained, evaporated, seeped);
 }
 
-/// The running mean of the water after a step; it arrives.
+/// The running mean of the water after a step; it arrives, also where the weight is so small that adding changes nothing any more.
 ///
 /// internal
 fn running_mean(mean: vec4<f32>, water: vec4<f32>, weight: f32) -> vec4<f32> {
     let next = mean + (water - mean) * weight;
-    return select(next, water, abs(water - next) <= 1e-5 * water + vec4<f32>(1e-7));
+    let stalled = bitcast<vec4<u32>>(next) == bitcast<vec4<u32>>(mean);
+    return select(next, water, stalled | (abs(water - next) <= 1e-5 * water + vec4<f32>(1e-7)));
 }

@@ -89,7 +89,8 @@ fn advance(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) id
         // Over open edges water falls as over a weir's crest.
         let fall = falls * here_water * min(sqrt(max(now.gravity * here_water, vec4<f32>(0.0))), vec4<f32>(0.249 / scale));
         let off = fall * ((at_left + at_right) + (select(0.0, 1.0, z == 0 && ends) + select(0.0, 1.0, z == now.rows - 1 && ends)));
-        let more = ((qx_left - qx) + (low_qz - qz)) * scale - off * scale;
+        // Nothing beyond the last column, where the face of the last cell would fill the next lane.
+        let more = inside * (((qx_left - qx) + (low_qz - qz)) * scale - off * scale);
         let moved = add_exactly(here_water, water[plane + at], more, now.none);
         var spring = vec4<f32>(0.0);
         if GROUND_FRESH != 0 {

@@ -50,12 +50,17 @@ fn edit(@builtin(global_invocation_id) id: vec3<u32>) {
     let at = place_of(now, group, z);
     let columns = columns_of(group);
     let inside = select(vec4<f32>(0.0), vec4<f32>(1.0), columns < vec4<i32>(now.columns));
-    let dx = vec4<f32>(columns) - tool.x;
-    let dz = f32(z) - tool.z;
+    let wraps = now.boundary == 2;
+    var dx = vec4<f32>(columns) - tool.x;
+    var dz = f32(z) - tool.z;
+    if wraps {
+        // The nearest of the cursors that a periodic ground has.
+        dx -= f32(now.columns) * round(dx / f32(now.columns));
+        dz -= f32(now.rows) * round(dz / f32(now.rows));
+    }
     let r = sqrt(dx * dx + dz * dz) / max(tool.radius, 1e-3);
     let fade = max(1.0 - r * r, vec4<f32>(0.0));
     let share = inside * select(fade * fade, vec4<f32>(1.0), vec4<bool>(tool.radius < 0.0));
-    let wraps = now.boundary == 2;
     let x = 4 * group;
     let left = select(max(x - 1, 0), now.columns - 1, wraps && x == 0);
     let right = select(min(x + 4, now.columns - 1), 0, wraps && x + 4 >= now.columns);

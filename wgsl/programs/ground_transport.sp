@@ -49,7 +49,7 @@ fn transport(@builtin(local_invocation_index) lane: u32, @builtin(workgroup_id) 
     let last = columns == vec4<i32>(now.columns - 1);
     let inside = select(vec4<f32>(0.0), vec4<f32>(1.0), columns < vec4<i32>(now.columns));
     let ends = now.boundary != 2;
-    let has_left = select(vec4<f32>(1.0), vec4<f32>(0.0), (columns == vec4<i32>(0)) & vec4<bool>(ends));
+    let has_left = inside * select(vec4<f32>(1.0), vec4<f32>(0.0), (columns == vec4<i32>(0)) & vec4<bool>(ends));
     let has_right = inside * select(vec4<f32>(1.0), vec4<f32>(0.0), last & vec4<bool>(ends));
     var gained = vec4<f32>(0.0);
     var evaporated = vec4<f32>(0.0);

@@ -34,8 +34,8 @@ pub struct SimulateArgs {
     /// Steps
     #[arg(long, value_name = "N", default_value_t = 1000)]
     pub steps: u64,
-    /// The state to begin with, .npy: float32, rows, columns, 8 to 14 channels; the scene's own when left out
-    #[arg(long = "in", value_name = "STATE.npy")]
+    /// The state to begin with, .npy: float32, rows, columns, 8 to 14 channels; the scene's own when left out. With it keys of --set that shape a new ground (SIZE, SEED, SHAPE, ...) do nothing
+    #[arg(long = "in", value_name = "STATE.npy", conflicts_with = "heights")]
     pub input: Option<PathBuf>,
     /// Heights, a cell a texel, in the place of the scene's: .png (grey, 8 or 16 bits), .exr or .npy
     #[arg(long, value_name = "FILE")]

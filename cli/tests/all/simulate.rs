@@ -3,7 +3,7 @@
 use npyz::WriterBuilder as _;
 use veduta_cli::image::read_png;
 
-use crate::common::{folder, veduta};
+use crate::common::{folder, json, veduta};
 
 #[test]
 fn simulate_draws_under_the_sky_and_from_above() {
@@ -87,4 +87,62 @@ fn simulate_draws_under_the_sky_and_from_above() {
     run(&["--eye", "-5,30,-5", "--target", "-5,30,-5"]).bad(1, &["camera.target"]);
     run(&["--heights", "lost.npy"]).bad(1, &["lost.npy"]);
     run(&["--scene", "pond.ron", "--exposure=-1"]).bad(1, &["--exposure"]);
+}
+
+fn floats(path: &std::path::Path, shape: &[u64], numbers: &[f32]) {
+    let mut writer = npyz::WriteOptions::new()
+        .default_dtype()
+        .shape(shape)
+        .writer(std::fs::File::create(path).unwrap())
+        .begin_nd()
+        .unwrap();
+    writer.extend(numbers.iter().copied()).unwrap();
+    writer.finish().unwrap();
+}
+
+/// A run goes on through its file bit for bit, though what is dug has taken the least height over the half of a metre; states have 8 channels too, and channels first.
+#[test]
+fn simulate_goes_on_from_a_file() {
+    let here = folder("simulate_in");
+    std::fs::write(
+        here.join("dug.ron"),
+        "(options: (boundary: Closed, rain: 1e-3, erosion: Some((capacity: 2.0, dig: 0.5, lay: 0.5))))",
+    )
+    .unwrap();
+    let run = |more: &[&str]| {
+        let common = ["simulate", "--scene", "dug.ron", "--quiet"];
+        veduta(&here, &[&common[..], more].concat())
+    };
+    // Least height 700.5001 m, with a spring's worth of water on it.
+    let (rows, columns) = (20, 24);
+    let cells: Vec<[f32; 8]> = (0..rows * columns)
+        .map(|k| {
+            let (x, z) = ((k % columns) as f32 - 9.0, (k / columns) as f32 - 8.0);
+            let height = 700.5001 + 0.037 * (x * x + z * z) + 0.3 * (1.7 * x).sin().abs();
+            [height, 0.3, 0.0, 0.1, 0.2, 0.0, 0.0, 0.1]
+        })
+        .collect();
+    let shape = [rows as u64, columns as u64, 8];
+    floats(&here.join("cells.npy"), &shape, cells.as_flattened());
+    let planes: Vec<f32> = (0..8)
+        .flat_map(|k| cells.iter().map(move |c| c[k]))
+        .collect();
+    floats(&here.join("planes.npy"), &[8, shape[0], shape[1]], &planes);
+    let steps = |from: &str, steps: &str, to: &str| {
+        let stats = format!("{to}.json");
+        let arguments = ["--in", from, "--steps", steps, "--out", to];
+        run(&[&arguments[..], &["--stats", &stats]].concat()).good();
+    };
+    steps("cells.npy", "120", "whole.npy");
+    steps("planes.npy", "120", "planes_after.npy");
+    steps("cells.npy", "80", "half.npy");
+    steps("half.npy", "40", "rest.npy");
+    let bytes = |name: &str| std::fs::read(here.join(name)).unwrap();
+    let least = json(&here.join("half.npy.json"))["ground_min_m"]
+        .as_f64()
+        .unwrap();
+    assert!(least < 700.5, "nothing was dug: {least}");
+    assert!(bytes("whole.npy") == bytes("planes_after.npy"));
+    assert!(bytes("whole.npy") == bytes("rest.npy"));
+    run(&["--in", "cells.npy", "--heights", "cells.npy"]).bad(2, &["--heights"]);
 }
