@@ -257,7 +257,6 @@ impl<'a> Query<'a> {
                 sharpness: shape.sharpness as f32,
                 weather_doublings: shape.weather_doublings,
                 least: 1.0,
-                ..Default::default()
             };
             let uniform = device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("veduta layer probe"),
