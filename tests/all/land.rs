@@ -261,7 +261,11 @@ fn a_search_that_is_cut_short_is_no_worse_than_none() {
         (errors.wrong + errors.at_silhouette, errors.centile(0.99))
     };
     let (none, cut) = (judged(0), judged(3));
-    assert!(cut.0 <= none.0 && cut.1 <= none.1, "{cut:?}, {none:?}");
+    // Measured: 2.5 footprints where none has 4.5; 4.1 where near misses are hits.
+    assert!(
+        cut.0 <= none.0 && cut.1 <= 0.7 * none.1,
+        "{cut:?}, {none:?}"
+    );
 }
 
 /// Rays that run out of steps before they come to a texel, at first or after near misses of the baked ground, end where they were and not at the eye.
