@@ -30,6 +30,7 @@ pub struct TemporalOptions {
     /// Whether histories are read with a cubic through sixteen pixels; else with a line between two, which blurs what moves and costs less.
     pub sharp: bool,
     /// Whether the host leaves what shows nothing transparent: where the depth is that of nothing and alpha is 0 all around, no frames are joined, and the result is 0.
+    /// Leave it off where something is drawn without depth or alpha: clouds over a transparent target leave its alpha at 0, so that squares which show nothing but clouds would be dropped.
     pub has_empty: bool,
 }
 

@@ -1,6 +1,7 @@
 //! Shadows of clouds on the ground of a plane.
 
 use crate::clouds::CloudShadow;
+use crate::error::Error;
 
 /// What the program `terrain` reads of a layer of clouds.
 #[derive(Debug)]
@@ -18,14 +19,30 @@ pub(super) struct CloudShade {
 /// The fields of `CloudTile` for no clouds: everything is lit by the one texel of the clear tile.
 const CLEAR: [f32; 11] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
+/// Bytes of these fields, as they are written.
+pub(super) const CLOUD_BYTES: u32 = 4 * CLEAR.len() as u32;
+
+/// Bytes of the uniform that holds them.
+pub(super) const CLOUD_BLOCK: u32 = CLOUD_BYTES.next_multiple_of(16);
+
 impl CloudShade {
-    pub fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> CloudShade {
+    /// Without clouds.
+    ///
+    /// # Errors
+    /// [`Error::Device`] where the device gives no memory.
+    pub fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> Result<CloudShade, Error> {
         let layer = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("veduta cloud shadow"),
-            size: 48,
+            size: u64::from(CLOUD_BLOCK),
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
+            mapped_at_creation: true,
         });
+        layer
+            .slice(..u64::from(CLOUD_BYTES))
+            .get_mapped_range_mut()
+            .map_err(|e| Error::Device(e.to_string()))?
+            .copy_from_slice(&CLEAR.map(f32::to_le_bytes).concat());
+        layer.unmap();
         let tile = device
             .create_texture(&wgpu::TextureDescriptor {
                 label: Some("veduta no clouds"),
@@ -39,14 +56,14 @@ impl CloudShade {
             })
             .create_view(&Default::default());
         let clear = (tile, device.create_sampler(&Default::default()));
-        CloudShade {
+        Ok(CloudShade {
             group: bound(device, layout, &layer, &clear.0, &clear.1),
             layout: layout.clone(),
             layer,
             clear,
             tile: None,
-            held: [0.0; 11],
-        }
+            held: CLEAR,
+        })
     }
 
     /// Takes the shadow of a frame; the number of writes.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group, nearest_ground};
-use super::cloud_shade::CloudShade;
+use super::cloud_shade::{CLOUD_BLOCK, CLOUD_BYTES, CloudShade};
 use super::ground::Prepared;
 use super::land::Land;
 use crate::clouds::CloudShadow;
@@ -177,14 +177,14 @@ fn azimuths([middle, right, up]: [Vec3; 3]) -> [f64; 2] {
     [middle.z.atan2(middle.x) + first, last - first]
 }
 
-/// The nearest ground that a picture shows, about: its distance along the ground and through the air (m); none where it shows none. Azimuths are those of [`azimuths`], no distance is taken below
-/// that of the nearest ground of all.
+/// The nearest ground that a picture shows, about: its distance along the ground and through the air (m); none where it shows none up to `far`. Azimuths are those of [`azimuths`], no distance is
+/// taken below that of the nearest ground of all. The planet is taken for flat, so that ground is nearer than it is.
 fn nearest_in_view(
     field: &Prepared<f32>,
     eye: WorldPos,
     [middle, right, up]: [Vec3; 3],
     [first, extent]: [f64; 2],
-    nearest: f64,
+    [nearest, far]: [f64; 2],
 ) -> Option<[f64; 2]> {
     let all = Some([0.0, nearest]);
     let tangent = |x: f32, y: f32| {
@@ -211,7 +211,8 @@ fn nearest_in_view(
     for i in 0..9 {
         let (sine, cosine) = (first + extent * f64::from(i) / 8.0).sin_cos();
         let mut distance = 0.25 * nearest.max(1.0);
-        while distance < found.min(1e5) {
+        // The last place lies behind the end, for what comes into view before it.
+        while distance < found.min(1.25 * far) {
             let at = [cosine * distance, sine * distance].map(|c| c as f32);
             let ground = field.ground_from(place, at, (0.1 * distance) as f32);
             let rise = f64::from(ground.height) - eye.altitude();
@@ -358,7 +359,8 @@ impl PlaneTerrain {
         let shade = layouts
             .get(2)
             .filter(|_| options.cloud_shadows)
-            .map(|layout| CloudShade::new(device, layout));
+            .map(|layout| CloudShade::new(device, layout))
+            .transpose()?;
         Ok(PlaneTerrain {
             clipmap,
             land: options.land.clone(),
@@ -392,7 +394,7 @@ impl PlaneTerrain {
             buffers: clipmap.buffers + 3 + shade,
             buffer_bytes: clipmap.buffer_bytes
                 + (ViewBlock::SIZE + FieldBlock::SIZE + RockBlock::SIZE) as u64
-                + u64::from(40 * shade),
+                + u64::from(CLOUD_BLOCK * shade),
             textures: clipmap.textures + shade,
             texture_bytes: clipmap.texture_bytes + u64::from(4 * shade),
             samplers: clipmap.samplers + shade,
@@ -416,7 +418,7 @@ impl PlaneTerrain {
         let writes = shade.set(device, queue, shadow);
         Ok(Work {
             writes,
-            bytes: u64::from(40 * writes),
+            bytes: u64::from(CLOUD_BYTES * writes),
             ..Work::default()
         })
     }
@@ -460,7 +462,7 @@ impl PlaneTerrain {
         let nearest = nearest_ground(&field, eye);
         let far = self.far.min(self.clipmap.reach());
         let azimuths = azimuths([middle, right, up]);
-        let shown = nearest_in_view(&field, eye, [middle, right, up], azimuths, nearest);
+        let shown = nearest_in_view(&field, eye, [middle, right, up], azimuths, [nearest, far]);
         // One that serves no place in view would not be used either. Texels stay small beside the distance to the ground all around, which must not come up to the eye.
         let pixel = f64::from(pixel_angle);
         let unused = shown.map_or(far, |[along, distance]| {
@@ -571,43 +573,80 @@ mod tests {
     fn no_ground_in_view_is_nearer_than_is_said() {
         let land = Land::default();
         let field = land.field.prepare::<f32>().unwrap();
-        let mut away = 0;
-        for k in 0..60 {
+        let far = 4e5;
+        let (mut away, mut through_the_air) = (0, 0);
+        for k in 0..75 {
             let turn = f64::from(k) * 0.37;
             let at = glam::DVec3::new(900.0 * f64::from(k), 0.0, -7_000.0 * turn);
             let ground = f64::from(field.ground(WorldPos::from_metres(at), 0.0).height);
-            let height = [3.0, 40.0, 300.0, 3000.0][k as usize % 4];
+            let height = [3.0, 40.0, 300.0, 3000.0, 20_000.0][k as usize / 5 % 5];
             let eye = WorldPos::from_metres(at + glam::DVec3::Y * (ground + height));
             let mut view = View {
                 eye,
                 ..Default::default()
             };
             let pitch = [-70.0, -30.0, 0.0, 15.0, 60.0][k as usize % 5];
-            view.look(turn, f64::to_radians(pitch), 1.0, 1.8);
+            view.look(
+                turn,
+                f64::to_radians(pitch),
+                [1.0, 0.4][k as usize % 2],
+                1.8,
+            );
             let rays = view.rays().unwrap();
             let nearest = nearest_ground(&field, eye);
-            let said = nearest_in_view(&field, eye, rays, azimuths(rays), nearest);
-            let (along, through) = said.map_or((1e5, 1e5), |[a, t]| (a, t));
+            let said = nearest_in_view(&field, eye, rays, azimuths(rays), [nearest, far]);
+            let (along, through) = said.map_or((far, far), |[a, t]| (a, t));
             away += u32::from(along > 2.0 * nearest);
-            // All ground up to there, on a fine grid, that lies before the eye is beyond the border of the picture.
+            // All ground on a fine grid that is nearer, along the ground or through the air, lies beyond the border of the picture.
             let axes = glam::Mat3::from_cols(rays[0], rays[1], rays[2]).inverse();
-            for i in 0..720 {
-                let (sine, cosine) = f64::to_radians(0.5 * f64::from(i)).sin_cos();
+            for i in 0..360 {
+                let (sine, cosine) = f64::to_radians(f64::from(i)).sin_cos();
                 for j in 1..200 {
-                    let distance = (0.005 * f64::from(j) * along).min(2e4);
+                    let distance = 0.005 * f64::from(j) * along.max(through);
                     let p = [cosine * distance, sine * distance].map(|c| c as f32);
                     let ground = field.ground_from(field.place(eye), p, 0.01 * distance as f32);
                     let rise = f64::from(ground.height) - eye.altitude();
                     let seen = axes * Vec3::new(p[0], rise as f32, p[1]);
                     let inside = seen.x > 0.0 && seen.y.abs().max(seen.z.abs()) < seen.x;
+                    through_the_air += u32::from(inside && distance < 0.95 * through);
                     assert!(
                         !inside || distance >= 0.999 * along,
                         "{k}: ground at {distance} m, said {along} m"
                     );
-                    assert!(!inside || distance.hypot(rise) > 0.8 * through, "{k}");
+                    assert!(
+                        !inside || distance.hypot(rise) > 0.8 * through,
+                        "{k}: ground {} m away through the air, said {through} m",
+                        distance.hypot(rise)
+                    );
                 }
             }
         }
-        assert!(away > 10, "{away} of 60");
+        assert!(away > 10, "{away} of 75");
+        // Places nearer along the ground than what is said through the air: only there the second bound says more than the first.
+        assert!(through_the_air > 1000, "{through_the_air}");
+    }
+
+    #[test]
+    fn ground_is_looked_for_as_far_as_rays_go() {
+        let land = Land::default();
+        let field = land.field.prepare::<f32>().unwrap();
+        let said = |height: f64, pitch: f64, far: f64| {
+            let mut view = View {
+                eye: WorldPos::from_metres(glam::DVec3::Y * height),
+                ..Default::default()
+            };
+            view.look(0.3, pitch.to_radians(), 40_f32.to_radians(), 1.8);
+            let rays = view.rays().unwrap();
+            let nearest = nearest_ground(&field, view.eye);
+            nearest_in_view(&field, view.eye, rays, azimuths(rays), [nearest, far])
+        };
+        // Rays 5 degrees below the horizon meet level ground at 230 km.
+        let [along, through] = said(20_000.0, 15.0, 4e5).unwrap();
+        assert!((7e4..2.3e5).contains(&along) && through >= along, "{along}");
+        assert_eq!(said(20_000.0, 15.0, 5e4), None);
+        // From 600 km the search begins beyond 100 km.
+        let [along, _] = said(6e5, 0.0, 4e6).unwrap();
+        assert!((5e5..1.7e6).contains(&along), "{along}");
+        assert_eq!(said(6e5, 30.0, 4e6), None);
     }
 }

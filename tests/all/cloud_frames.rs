@@ -382,6 +382,13 @@ fn clouds_shade_the_ground() {
         sky: Vec3::ZERO,
         bounce: Vec3::ZERO,
     };
+    // Before it is told anything no cloud shades it.
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let _ = terrain
+        .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+        .unwrap();
+    gpu.queue.submit([encoder.finish()]);
+    let (untold, _, _) = crate::land::drawn(&terrain, columns, rows, 0.0);
     let mut draw = |shadow: Option<f64>| {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         view.time = shadow.unwrap_or(0.0);
@@ -404,6 +411,7 @@ fn clouds_shade_the_ground() {
     let (shaded, _, _) = draw(Some(200.0));
     let (again, _, _) = draw(None);
     assert!(lit == again, "without clouds there is no shadow");
+    assert!(lit == untold, "none is told yet");
     let [middle, right, up] = view.rays().unwrap();
     let forward = view.world_from_view.transform_vector3(Vec3::NEG_Z);
     let eye = view.eye.to_metres();

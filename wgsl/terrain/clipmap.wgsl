@@ -120,18 +120,19 @@ fn clearing_tangent(ground_radius: f32, eye_altitude: f32, top: f32, near: f32, 
     return tangent + 1e-6 + 1e-5 * abs(tangent);
 }
 
-/// First place from the distance `near` on where a ray from the eye meets the baked ground, or comes nearer to it than the margin, before `far`. A ray that uses up `max_steps` has no hit, but tells how far it came. `sectors` holds, for each sector of azimuth, the tangents that clear the ground of its rings; see `veduta::terrain_bake`.
+/// First place from the distance `near` on where a ray from the eye meets the baked ground, or comes nearer to it than `margin` texels, before `far`. A ray that uses up `max_steps` has no hit, but tells how far it came, and how high above the baked ground it is there. `sectors` holds, for each sector of azimuth, the tangents that clear the ground of its rings; see `veduta::terrain_bake`.
 ///
 /// domain  dir in [-1, 1] 1 lin
 /// domain  near in [0, 1e6] m lin
 /// domain  far in [0, 1e6] m lin
+/// domain  margin in [0, 1] 1 lin
 /// domain  max_steps in [0, 10000] 1 lin
 /// range   [-1e6, 1e6] m
 /// error   1 abs of reference::intersect::first_crossing
 /// outside undefined
 /// source  Tevs2008 (maxima of many sizes); departs: maxima of elevations, by sector and ring
-fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_2d<f32>, places: texture_2d<f32>, clip: Clip, dir: vec3<f32>, near: f32, far: f32, max_steps: i32) -> ClipHit {
-    var hit = ClipHit(-1.0, 0.0, 0.0, clip.spacing, vec2<f32>(0.0), 0);
+fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_2d<f32>, places: texture_2d<f32>, clip: Clip, dir: vec3<f32>, near: f32, far: f32, margin: f32, max_steps: i32) -> ClipHit {
+    var hit = ClipHit(-1.0, near, 0.0, clip.spacing, vec2<f32>(0.0), 0);
     let start = clip.eye_altitude;
     let radius = clip.ground_radius + start;
     let flat = select(dir.xz, vec2<f32>(1e-6), abs(dir.xz) < vec2<f32>(1e-6));
@@ -189,11 +190,9 @@ fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_
             let h = corners(heights, wrapping, clip, vec2<i32>(whole), min(level, clip.levels - 1));
             let here = altitude - patch_height(h, u - whole);
             let there = altitude + rise * step - patch_height(h, clamp(u - whole + flat * place.z * step, vec2<f32>(0.0), vec2<f32>(1.0)));
-            hit.reached = t;
-            hit.clearance = here;
             hit.spacing = place.w;
             hit.steps += 1;
-            if min(here, there) <= clip.margin * place.w {
+            if min(here, there) <= margin * place.w {
                 hit.slope = 0.5 * place.z * vec2<f32>(h.y - h.x + h.w - h.z, h.z - h.x + h.w - h.y);
                 hit.distance = t + select(0.0, step * max(here, 0.0) / max(max(here, 0.0) - there, 1e-9), there <= 0.0);
                 done = true;
@@ -203,6 +202,11 @@ fn clip_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_
         }
         ring += select(0, 1, t >= end);
     }
+    // Where it ran out of steps: all rings before this one are clear.
+    hit.reached = min(max(t, ring_radius(clip, min(ring, clip.rings)) * outwards), far);
+    let over = dir.xz * hit.reached;
+    let q = hit.reached * (hit.reached + 2.0 * radius * dir.y);
+    hit.clearance = start + q / (radius + sqrt(max(radius * radius + q, 0.0))) - baked_height(heights, wrapping, places, clip, over, 0);
     // A ring may reach beyond the end of the ray.
     hit.distance = select(hit.distance, -1.0, hit.distance > far);
     return hit;
@@ -231,7 +235,7 @@ fn likely_end(ground_radius: f32, eye_altitude: f32, mu: f32, reached: f32, clea
 ///
 /// internal
 fn likely_distance(clip: Clip, dir: vec3<f32>, hit: ClipHit, far: f32, max_steps: i32) -> f32 {
-    let capped = hit.distance < 0.0 && hit.steps >= max_steps;
+    let capped = hit.distance < 0.0 && hit.steps >= max_steps && hit.reached < far;
     let end = likely_end(clip.ground_radius, clip.eye_altitude, dir.y, hit.reached, hit.clearance, far);
     return select(hit.distance, end, capped);
 }

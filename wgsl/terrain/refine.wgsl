@@ -93,10 +93,12 @@ fn found_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture
     var most = 0.0;
     var last = refine_steps;
     while true {
-        let hit = clip_hit(heights, wrapping, sectors, places, clip, dir, near, far, max_steps - steps);
+        // When no place is left to look at the field, near misses of what is baked are none of its hits.
+        let margin = select(0.0, clip.margin, left > 0);
+        let hit = clip_hit(heights, wrapping, sectors, places, clip, dir, near, far, margin, max_steps - steps);
         steps += hit.steps;
         if hit.distance < 0.0 || left <= 0 {
-            found.capped = hit.distance < 0.0 && steps >= max_steps;
+            found.capped = hit.distance < 0.0 && steps >= max_steps && hit.reached < far;
             found.distance = likely_distance(clip, dir, hit, far, max_steps - steps + hit.steps);
             found.slope = hit.slope;
             most = 2.0 * hit.spacing;
