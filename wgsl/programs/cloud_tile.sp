@@ -53,26 +53,25 @@ struct TileRows {
 
 #ifdef CLOUD_WIDE
 const TEXELS: i32 = 1;
-
-fn word_of(codes: vec4<f32>) -> u32 {
-    return half_word(codes.xy);
-}
-
-fn code_of(density: f32, depth: f32) -> vec2<f32> {
-    return vec2<f32>(density, min(depth, 6e4));
-}
 #else
 // To a word.
 const TEXELS: i32 = 2;
-
-fn word_of(codes: vec4<f32>) -> u32 {
-    return pack4x8unorm(codes);
-}
-
-fn code_of(density: f32, depth: f32) -> vec2<f32> {
-    return tile_code(density, depth, tile.least);
-}
 #endif
+
+// Density before its cut above a column of the tile.
+fn density_over(layer: CloudLayer, column: i32, row: i32, up: f32) -> f32 {
+    let foot = (vec2<f32>(f32(column), f32(tile.first_row + row)) + 0.5) / f32(tile.texels) * tile.edge;
+    let at = foot + tile.shear * up;
+    // Not beyond the spheres by rounding.
+    let altitude = clamp(tile.bottom + up, tile.bottom, tile.bottom + tile.thickness);
+#ifdef CLOUD_SHAPED
+    let shape = CloudShape(tile.kind, tile.kind_spread, tile.coverage_spread, tile.detail, tile.sharpness, tile.weather_doublings);
+    let found = shaped_density(layer, shape, vec3<f32>(at.x, 0.0, at.y), altitude);
+#else
+    let found = uncut_density(layer, vec3<f32>(at.x, 0.0, at.y), altitude);
+#endif
+    return clamp(found, -1000.0, 1.0);
+}
 
 @compute @workgroup_size(64)
 fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -87,39 +86,25 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     let row = column / across;
     let height = tile.thickness / f32(tile.levels - 1);
     let scale = tile.extinction * height * tile.slant;
+    // Rows of copies begin at multiples of 256 bytes.
+    let words = (tile.texels + 64 * TEXELS - 1) / (64 * TEXELS) * 64;
     var above = vec2<f32>(0.0);
     var depth = vec2<f32>(0.0);
     for (var j = tile.levels - 1; j >= 0; j--) {
         let up = f32(j) * height;
-        // Not beyond the spheres by rounding.
-        let altitude = clamp(tile.bottom + up, tile.bottom, tile.bottom + tile.thickness);
-        var codes = vec4<f32>(0.0);
-        for (var side = 0; side < TEXELS; side++) {
-            let foot = (vec2<f32>(f32(TEXELS * i + side), f32(tile.first_row + row)) + 0.5) / f32(tile.texels) * tile.edge;
-            let at = foot + tile.shear * up;
-#ifdef CLOUD_SHAPED
-            let shape = CloudShape(tile.kind, tile.kind_spread, tile.coverage_spread, tile.detail, tile.sharpness, tile.weather_doublings);
-            let found = shaped_density(layer, shape, vec3<f32>(at.x, 0.0, at.y), altitude);
+        let gain = select(scale, 0.0, j == tile.levels - 1);
+        let left = density_over(layer, TEXELS * i, row, up);
+        depth.x += gain * mean_density(above.x, left);
+        above.x = left;
+#ifdef CLOUD_WIDE
+        let word = half_word(vec2<f32>(left, min(depth.x, 6e4)));
 #else
-            let found = uncut_density(layer, vec3<f32>(at.x, 0.0, at.y), altitude);
+        let right = density_over(layer, 2 * i + 1, row, up);
+        depth.y += gain * mean_density(above.y, right);
+        above.y = right;
+        let word = pack4x8unorm(vec4<f32>(tile_code(left, depth.x, tile.least), tile_code(right, depth.y, tile.least)));
 #endif
-            let density = clamp(found, -1000.0, 1.0);
-            let before = select(above.x, above.y, side == 1);
-            let sum = select(depth.x, depth.y, side == 1) + select(scale * mean_density(before, density), 0.0, j == tile.levels - 1);
-            let code = code_of(density, sum);
-            if side == 0 {
-                above.x = density;
-                depth.x = sum;
-                codes = vec4<f32>(code, 0.0, 0.0);
-            } else {
-                above.y = density;
-                depth.y = sum;
-                codes = vec4<f32>(codes.xy, code);
-            }
-        }
-        // Rows of copies begin at multiples of 256 bytes.
-        let words = (tile.texels + 64 * TEXELS - 1) / (64 * TEXELS) * 64;
-        texels[(j * tile.rows + row) * words + i] = word_of(codes);
+        texels[(j * tile.rows + row) * words + i] = word;
     }
 }
     }#
