@@ -387,9 +387,6 @@ impl Clouds {
                     constants.push(("CLOUD_HALF", f64::from(u8::from(quality.half))));
                 }
             }
-            if march && air_features.is_some() && !outside {
-                constants.push(("EYE_PLACE", 0.0));
-            }
             // A coarse picture holds nothing but the layer.
             let coarse = march && quality.half;
             let options = PipelineOptions {

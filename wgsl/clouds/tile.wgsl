@@ -26,7 +26,7 @@ struct CloudTile {
     extinction: f32,
     /// Way that is free of clouds for each unit that the tile's density is below 0 [m].
     clear: f32,
-    /// The least density that the tile tells [1].
+    /// The least density that the tile tells, below 0; 1 for a tile of 16 bits a number, which tells all [1].
     least: f32,
 }
 

@@ -82,7 +82,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::planet::shell::{ground_distance}
 #ifdef CLOUD_AIR
 #import veduta::atmosphere::medium::{Air}
-#import veduta::atmosphere::sky_view::{SkyEye, sky_place_shown, sky_place_outside}
+#import veduta::atmosphere::sky_view::{SkyEye, sky_place_shown}
 #import veduta::atmosphere::ray::{AirLight, air_ray}
 #import veduta::atmosphere::aerial::{aerial_light}
 #endif
@@ -161,10 +161,7 @@ override CLOUD_HALF: i32 = 0;
 override CLOUD_MASK: i32 = 0;
 
 #ifdef CLOUD_AIR
-// Where the eye is: above the air with 2.
-override EYE_PLACE: i32 = 0;
-
-// Air, eye and tables of the sky behind the clouds.
+// Air, eye and tables of the sky behind the clouds, for eyes within the air.
 @group(2) @binding(0) var<uniform> air: Air;
 @group(2) @binding(1) var<uniform> eye: SkyEye;
 @group(2) @binding(2) var clamped: sampler;
@@ -173,10 +170,7 @@ override EYE_PLACE: i32 = 0;
 
 // Light and transmittance of the air up to a distance.
 fn air_before(dir: vec3<f32>, distance: f32) -> AirLight {
-    var place = sky_place_shown(eye, dir);
-    if EYE_PLACE == 2 {
-        place = sky_place_outside(eye, dir);
-    }
+    let place = sky_place_shown(eye, dir);
     let ray = air_ray(air.ground_radius, air.top, eye.altitude, dir, eye.to_sun, 1e9);
     return aerial_light(air_table, air_depths, clamped, air, eye, place, distance - ray.from_eye, ray.length);
 }
