@@ -77,7 +77,7 @@ impl Tile {
                     format: if wide {
                         wgpu::TextureFormat::Rg16Float
                     } else {
-                        wgpu::TextureFormat::Rg8Unorm
+                        wgpu::TextureFormat::Rg8Snorm
                     },
                     usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
                     view_formats: &[],

@@ -17,7 +17,7 @@ pub(super) struct CloudShade {
 }
 
 /// The fields of `CloudTile` for no clouds: everything is lit by the one texel of the clear tile.
-const CLEAR: [f32; 11] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+const CLEAR: [f32; 11] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
 
 /// Bytes of these fields, as they are written.
 pub(super) const CLOUD_BYTES: u32 = 4 * CLEAR.len() as u32;

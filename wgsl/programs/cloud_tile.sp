@@ -102,7 +102,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
         let right = density_over(layer, 2 * i + 1, row, up);
         depth.y += gain * mean_density(above.y, right);
         above.y = right;
-        let word = pack4x8unorm(vec4<f32>(tile_code(left, depth.x, tile.least), tile_code(right, depth.y, tile.least)));
+        let word = pack4x8snorm(vec4<f32>(tile_code(left, depth.x, tile.least), tile_code(right, depth.y, tile.least)));
 #endif
         texels[(j * tile.rows + row) * words + i] = word;
     }

@@ -19,25 +19,27 @@ use crate::render::picture;
 const CONVERGED: (i64, i64) = (512, 32);
 
 /// Counts of the loop that are compared.
-const LOOPS: [(i64, i64); 4] = [(64, 12), (128, 12), (128, 24), (256, 24)];
+const LOOPS: [(i64, i64); 5] = [(64, 12), (128, 12), (128, 24), (192, 24), (256, 24)];
 
 /// Texels, levels and steps of the system, and whether texels have 16 bits a number.
-const FINENESS: [(u32, u32, u32, bool); 16] = [
+const FINENESS: [(u32, u32, u32, bool); 18] = [
     (128, 32, 32, false),
     (128, 32, 48, false),
-    (256, 64, 32, false),
+    (192, 32, 48, false),
+    (192, 64, 48, false),
+    (192, 32, 64, false),
     (256, 64, 48, false),
     (256, 64, 64, false),
     (256, 64, 96, false),
     (384, 64, 64, false),
     (384, 64, 96, false),
-    (512, 64, 64, false),
-    (512, 64, 96, false),
+    (384, 64, 128, false),
     (512, 64, 128, false),
-    (512, 64, 64, true),
-    (512, 64, 96, true),
-    (512, 64, 128, true),
+    (512, 64, 192, false),
+    (512, 96, 192, false),
+    (512, 128, 256, false),
     (512, 64, 192, true),
+    (512, 96, 192, true),
     (512, 128, 256, true),
 ];
 
