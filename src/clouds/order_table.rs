@@ -24,6 +24,9 @@ const SHARES: u32 = 4;
 /// Frames that a new tile takes to fill the cells.
 const FILLS: u32 = 8;
 const DIRECTIONS: u32 = 24;
+/// How far texels go in a frame to what the cells have found, and for how many frames after it was found: what is left then is 0.4 %.
+const EASE: f32 = 0.17;
+const SETTLING: u32 = 30;
 
 /// Light of one kind in the cells of a grid.
 #[derive(Debug)]
@@ -88,6 +91,8 @@ pub(super) struct OrderTable {
     left: [u32; KINDS],
     /// Which kind is being swept, and how many of its shares are done.
     at: (usize, u32),
+    /// Frames until texels have gone on to what the cells have found.
+    settling: u32,
 }
 
 impl OrderTable {
@@ -255,6 +260,7 @@ impl OrderTable {
             filled: 0,
             left: [0; KINDS],
             at: (0, 0),
+            settling: 0,
         })
     }
 
@@ -288,19 +294,25 @@ impl OrderTable {
             self.filled = 0;
             self.left[0] = self.left[0].max(NEXT_SWEEPS);
         }
+        let mut told = false;
         if self.filled < FILLS {
             let cells = self.grids[1].cells();
             let first = self.filled * cells / FILLS;
             let count = (self.filled + 1) * cells / FILLS - first;
             self.fill(queue, encoder, 1, (shown, to_sun), [first, count], work);
             self.filled += 1;
-            return;
+        } else {
+            if self.left[self.at.0] == 0 {
+                self.turn();
+            }
+            if self.left[self.at.0] > 0 {
+                told = self.at.0 == 0;
+                self.share(queue, encoder, to_sun, work);
+            }
         }
-        if self.left[self.at.0] == 0 {
-            self.turn();
-        }
-        if self.left[self.at.0] > 0 {
-            self.share(queue, encoder, to_sun, work);
+        if self.settling > 0 {
+            self.settling -= 1;
+            self.publish(queue, encoder, to_sun, !told, work);
         }
     }
 
@@ -326,7 +338,7 @@ impl OrderTable {
         let count = grid.cells() as usize;
         dispatch(encoder, &self.gather, &light.gather, count.div_ceil(64));
         work.dispatches += 1;
-        self.publish(queue, encoder, to_sun, kind != 0, work);
+        self.settling = SETTLING;
         self.left[kind] -= 1;
         self.turn();
     }
@@ -345,6 +357,8 @@ impl OrderTable {
         tile: (usize, [f32; 3]),
         work: &mut Work,
     ) {
+        // What is shown first is what is found first.
+        self.settling = u32::MAX;
         for grid in [0, 1] {
             let count = self.grids[grid].cells();
             self.fill(queue, encoder, grid, tile, [0, count], work);
@@ -378,6 +392,7 @@ impl OrderTable {
         self.left = SWEEPS;
         self.at = (0, 0);
         self.publish(queue, encoder, tile.1, false, work);
+        self.settling = 0;
     }
 
     fn lit(&self, grid: usize, kind: usize, to_sun: [f32; 3], first: u32) -> GridBlock {
@@ -395,6 +410,7 @@ impl OrderTable {
             cells: self.grids[grid].shape,
             coarse: self.grids[0].shape,
             first: first as i32,
+            ease: if self.settling == u32::MAX { 1.0 } else { EASE },
             ..self.block
         }
     }

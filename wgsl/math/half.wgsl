@@ -16,3 +16,12 @@ fn half_bits(x: f32) -> u32 {
 fn half_word(pair: vec2<f32>) -> u32 {
     return half_bits(pair.x) | (half_bits(pair.y) << 16u);
 }
+
+/// The numbers of such a word.
+///
+/// internal
+fn word_halves(word: u32) -> vec2<f32> {
+    let bits = vec2<u32>(word & 0xffffu, word >> 16u);
+    let size = bitcast<vec2<f32>>((bits & vec2<u32>(0x7fffu)) << vec2<u32>(13u)) * 5.192297e33;
+    return select(size, -size, bits >= vec2<u32>(0x8000u));
+}

@@ -16,7 +16,11 @@ orders a table of depth and angle holds.
 #import veduta::clouds::tile::{CloudTile, tile_at}
 #import veduta::planet::shell::{shell_segment, clip_segment, segment_length, segment_distance, altitude_along, ground_distance, direction_cosine_along}
 #endif
+#ifdef CLOUD_PUBLISH
+#import veduta::math::half::{half_word, word_halves}
+#else
 #import veduta::math::half::{half_word}
+#endif
 #import veduta::math::series::{one_minus_exp, one_minus_exp_over_x}
 
 struct CloudGrid {
@@ -63,6 +67,8 @@ struct CloudGrid {
     momentum: f32,
     // The least density that the tile tells.
     least: f32,
+    // How far a texel goes to what it is to be.
+    ease: f32,
 }
 
 @group(0) @binding(0) var<uniform> grid: CloudGrid;
@@ -453,6 +459,12 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
 @group(1) @binding(11) var<storage, read> from_below: array<vec4<f32>>;
 @group(2) @binding(7) var<storage, read_write> texels: array<vec2<u32>>;
 
+// A texel that has gone on to what it is to be, so that light that a frame has found does not appear in one.
+fn eased(held: vec2<u32>, found: vec4<f32>) -> vec2<u32> {
+    let now = mix(vec4<f32>(word_halves(held.x), word_halves(held.y)), found, grid.ease);
+    return vec2<u32>(half_word(now.xy), half_word(now.zw));
+}
+
 // A texel a cell: what it scatters of the sun's light evenly, and for each unit of the cosine between view and sun; of the light from above, and from below.
 @compute @workgroup_size(64)
 fn publish(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -465,7 +477,7 @@ fn publish(@builtin(global_invocation_id) id: vec3<u32>) {
     let along = -0.48860251 * dot(found.wyz, grid.to_sun);
     let even = 0.28209479 * vec3<f32>(found.x, from_above[4 * i].x, from_below[4 * i].x);
     let at = vec3<i32>(i % n.x, (i / n.x) % n.y, i / (n.x * n.y));
-    texels[(at.y * n.z + at.z) * n.x + at.x] = vec2<u32>(half_word(vec2<f32>(even.x, along)), half_word(even.yz));
+    texels[(at.y * n.z + at.z) * n.x + at.x] = eased(texels[(at.y * n.z + at.z) * n.x + at.x], vec4<f32>(even.x, along, even.yz));
 }
 #else
 #ifdef CLOUD_LAYERED
