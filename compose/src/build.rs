@@ -69,7 +69,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         "terrain_rays" | "terrain_globe_rays" => {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
-        "cloud_tile" => {
+        "cloud_tile" | "cloud_window" => {
             let kinds = [vec![], vec!["CLOUD_SHAPED"]];
             return [vec![], vec!["CLOUD_WIDE"]]
                 .iter()
@@ -110,8 +110,13 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             let drawn = airs
                 .iter()
                 .flat_map(|air| ways.iter().map(move |way| set(way, air)));
+            let windowed = airs.iter().flat_map(|air| {
+                let own = [&["CLOUD_WINDOW"], *air].concat();
+                ways[..2].iter().map(move |way| set(way, &own))
+            });
             let laid: [&[&str]; 2] = [&[], &["CLOUD_OVER_DEPTH"]];
             return drawn
+                .chain(windowed)
                 .chain(laid.iter().map(|way| set(&["CLOUD_UPSAMPLE"], way)))
                 .collect();
         }

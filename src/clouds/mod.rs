@@ -10,6 +10,7 @@ mod phase;
 mod system;
 mod tile;
 pub mod volume;
+mod window;
 
 pub use air_lights::AirLights;
 pub use deck::{CloudDeck, CloudShape, back_to_front};

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::order_table::{OrderTable, check_cells};
 use super::tile::{Tile, slant};
+use super::window::Windows;
 use super::{AirLights, CloudDeck, Orders, fault};
 use crate::atmosphere::{Atmosphere, SkyTables};
 use crate::error::Error;
@@ -68,6 +69,8 @@ pub struct CloudQuality {
     pub frames: u32,
     /// Cells along the edge of the table of light of all orders, a multiple of 32 in [32, 128], and along its height, in [2, 64].
     pub cells: [u32; 2],
+    /// Texels of the edge of each window that takes the tile's place for a layer that does not repeat near enough ([`CloudDeck::is_windowed`]), a multiple of 32 in [64, 512].
+    pub window_texels: u32,
     /// Whether texels of the tile have 16 bits a number instead of 8: twice the memory, for errors below a hundredth.
     pub wide: bool,
     /// Whether the march is drawn for half as many pixels a side, by [`Clouds::encode_volumes`], and laid over the picture by the four around each pixel whose rays end as far away.
@@ -85,6 +88,11 @@ impl CloudQuality {
             Preset::Medium => (192, 128, 64, 48, 8),
             _ => (384, 192, 64, 96, 16),
         };
+        let window_texels = match preset {
+            Preset::Low => 128,
+            Preset::Medium => 160,
+            _ => 256,
+        };
         CloudQuality {
             texels,
             first_texels,
@@ -94,6 +102,7 @@ impl CloudQuality {
             second_tile: true,
             frames: 30,
             cells: [32, cell_levels],
+            window_texels,
             wide: false,
             half: false,
             jitter: false,
@@ -120,6 +129,10 @@ impl CloudQuality {
                 let domain = "a multiple of 64 in [64, 1024]";
                 return Err(fault(&format!("quality.{name}"), texels, domain));
             }
+        }
+        if !(64..=512).contains(&self.window_texels) || !self.window_texels.is_multiple_of(32) {
+            let domain = "a multiple of 32 in [64, 512]";
+            return Err(fault("quality.window_texels", self.window_texels, domain));
         }
         for (name, value, low, high) in [
             ("levels", self.levels, 2, 256),
@@ -204,7 +217,10 @@ pub struct Clouds {
     quality: CloudQuality,
     far: f64,
     depth: Depth,
+    /// As good as none where there are windows.
     tile: Tile,
+    /// For a layer that does not repeat near enough.
+    windows: Option<Windows>,
     /// Light of many orders; none for single scattering.
     orders: Option<OrderTable>,
     /// For an eye within the air, and where air is shown for one above it.
@@ -318,8 +334,20 @@ impl Clouds {
         if quality.second_tile {
             texels.push(quality.texels);
         }
-        // What shows nothing has no tile worth its name.
-        let (texels, levels) = if options.deck.is_empty() {
+        let windowed = options.deck.is_windowed() && !options.deck.is_empty();
+        let windows = if windowed {
+            Some(Windows::new(
+                device,
+                programs,
+                &options.deck,
+                &quality,
+                options.far,
+            )?)
+        } else {
+            None
+        };
+        // What shows nothing has no tile worth its name, nor what has windows.
+        let (texels, levels) = if options.deck.is_empty() || windowed {
             (vec![64, 64], 2)
         } else {
             (texels, quality.levels)
@@ -340,6 +368,9 @@ impl Clouds {
             None
         };
         let mut features = Vec::new();
+        if windowed {
+            features.push("CLOUD_WINDOW");
+        }
         if options.over_depth {
             features.push("CLOUD_OVER_DEPTH");
         }
@@ -444,6 +475,7 @@ impl Clouds {
             entries: &[
                 Some((0, &view)),
                 orders.as_ref().map(|table| (1, &table.weights)),
+                windows.as_ref().map(|windows| (2, &windows.uniform)),
             ]
             .into_iter()
             .flatten()
@@ -478,6 +510,7 @@ impl Clouds {
             far: options.far,
             depth: targets.depth,
             tile,
+            windows,
             orders,
             pipelines,
             outside: false,
@@ -506,15 +539,17 @@ impl Clouds {
     }
 
     fn bind(&mut self, device: &wgpu::Device) {
-        self.groups = self
-            .tile
-            .views
+        let (views, sampler) = match &self.windows {
+            Some(windows) => (std::slice::from_ref(&windows.view), &windows.sampler),
+            None => (&self.tile.views[..], &self.tile.sampler),
+        };
+        self.groups = views
             .iter()
             .map(|view| {
                 let mut entries = vec![
                     wgpu::BindGroupEntry {
                         binding: 0,
-                        resource: wgpu::BindingResource::Sampler(&self.tile.sampler),
+                        resource: wgpu::BindingResource::Sampler(sampler),
                     },
                     wgpu::BindGroupEntry {
                         binding: 1,
@@ -665,6 +700,9 @@ impl Clouds {
     /// What hosts need to shade their own things, for the eye of the last [`Clouds::prepare`]; none before the first, for a layer without clouds, whose shadow is 1 everywhere, and without
     /// [`CloudsOptions::shadows`] for a view that cannot show the layer. Straight light alone: what the clouds scatter down is not in it.
     pub fn shadow(&self) -> Option<CloudShadow<'_>> {
+        if self.windows.is_some() {
+            return None;
+        }
         let (shown, _) = self.shown.filter(|_| self.seen || self.shadows)?;
         Some(CloudShadow {
             tile: &self.tile.views[shown],
@@ -680,7 +718,9 @@ impl Clouds {
 
     /// What it keeps on the device.
     pub fn resources(&self) -> Resources {
-        let parts = self.tile.slots();
+        let windows = self.windows.as_ref();
+        let parts = self.tile.slots() + windows.map_or(0, Windows::bind_groups);
+        let own = u32::from(windows.is_some());
         let tiles = self.groups.len() as u32;
         let orders = self.orders.as_ref().map(OrderTable::holds);
         let (textures, bytes, buffers, groups) = orders.unwrap_or_default();
@@ -693,21 +733,28 @@ impl Clouds {
             8 * u64::from(view.texture().width()) * u64::from(view.texture().height())
         });
         Resources {
-            pipelines: 1 + self.pipelines.len() as u32 + 5 * more + laid,
+            pipelines: 1 + self.pipelines.len() as u32 + 5 * more + laid + own,
             bind_groups: parts + 2 + tiles + groups + air + laid + held,
             bindings: parts
                 + 2
+                + own
                 + more
                 + (2 + more + u32::from(self.over_depth)) * tiles
                 + 2 * groups
                 + 5 * air
                 + laid
                 + held * (1 + u32::from(self.over_depth)),
-            buffers: parts + 2 + buffers,
-            buffer_bytes: self.tile.buffer_bytes() + DrawBlock::SIZE as u64 + bytes,
-            textures: self.tile.views.len() as u32 + more + held,
-            texture_bytes: self.tile.texture_bytes() + textures + coarse_bytes,
-            samplers: 1,
+            buffers: self.tile.slots() + 2 + 3 * own + buffers,
+            buffer_bytes: self.tile.buffer_bytes()
+                + windows.map_or(0, Windows::buffer_bytes)
+                + DrawBlock::SIZE as u64
+                + bytes,
+            textures: self.tile.views.len() as u32 + own + more + held,
+            texture_bytes: self.tile.texture_bytes()
+                + windows.map_or(0, Windows::texture_bytes)
+                + textures
+                + coarse_bytes,
+            samplers: 1 + own,
         }
     }
 
@@ -750,7 +797,16 @@ impl Clouds {
         }
         let to_sun = view.sun.to_light.normalize_or(Vec3::Y);
         let before = self.shown;
-        if lights.sun.max_element() > 0.0 || self.shown.is_none() {
+        let deck = &self.deck;
+        if let Some(windows) = &mut self.windows {
+            let drift = glam::DVec3::new(deck.wind[0], 0.0, deck.wind[1]) * view.time;
+            let moved = view.eye.moved_by(-drift);
+            // At night they follow the eye alone.
+            let day = lights.sun.max_element() > 0.0 || self.shown.is_none();
+            let sun = day.then_some(to_sun);
+            self.fresh = windows.advance(queue, encoder, deck, moved, sun, &mut work);
+            self.shown = windows.sun().map(|sun| (0, sun));
+        } else if lights.sun.max_element() > 0.0 || self.shown.is_none() {
             self.bake(queue, encoder, to_sun, &mut work);
         } else {
             // At night no tile is needed for where the sun goes.
@@ -788,7 +844,10 @@ impl Clouds {
             ray_right: right.to_array(),
             ground_radius: deck.planet_radius as f32,
             ray_up: up.to_array(),
-            far: self.far as f32,
+            far: match &self.windows {
+                Some(windows) => self.far.min(windows.reach(deck)),
+                None => self.far,
+            } as f32,
             forward: view
                 .world_from_view
                 .transform_vector3(Vec3::NEG_Z)
