@@ -112,7 +112,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 .flat_map(|air| ways.iter().map(move |way| set(way, air)));
             let windowed = airs.iter().flat_map(|air| {
                 let own = [&["CLOUD_WINDOW"], *air].concat();
-                ways[..2].iter().map(move |way| set(way, &own))
+                ways.iter().map(move |way| set(way, &own))
             });
             let laid: [&[&str]; 2] = [&[], &["CLOUD_OVER_DEPTH"]];
             return drawn
@@ -121,7 +121,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 .collect();
         }
         "cloud_volume" => {
-            let ways: [&[&str]; 13] = [
+            let ways: [&[&str]; 15] = [
                 &[],
                 &["CLOUD_READS_NODES"],
                 &["CLOUD_NODES"],
@@ -135,6 +135,8 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 &["CLOUD_LAYERED", "CLOUD_GATHER"],
                 &["CLOUD_LAYERED", "CLOUD_GATHER", "CLOUD_PROLONG"],
                 &["CLOUD_LAYERED", "CLOUD_PUBLISH"],
+                &["CLOUD_LAYERED", "CLOUD_CELLS", "CLOUD_WINDOW"],
+                &["CLOUD_LAYERED", "CLOUD_PUBLISH", "CLOUD_WINDOW"],
             ];
             let set = |flags: &&[&str]| flags.iter().map(|f| (*f).to_owned()).collect();
             return ways.iter().map(set).collect();

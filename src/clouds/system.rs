@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
-use super::order_table::{OrderTable, check_cells};
+use super::order_table::{OrderTable, Source, check_cells};
 use super::tile::{Tile, slant};
-use super::window::Windows;
+use super::window::{WindowQuality, Windows};
 use super::{AirLights, CloudDeck, Orders, fault};
 use crate::atmosphere::{Atmosphere, SkyTables};
 use crate::error::Error;
@@ -69,8 +69,8 @@ pub struct CloudQuality {
     pub frames: u32,
     /// Cells along the edge of the table of light of all orders, a multiple of 32 in [32, 128], and along its height, in [2, 64].
     pub cells: [u32; 2],
-    /// Texels of the edge of each window that takes the tile's place for a layer that does not repeat near enough ([`CloudDeck::is_windowed`]), a multiple of 32 in [64, 512].
-    pub window_texels: u32,
+    /// Of a layer that does not repeat near enough ([`CloudDeck::is_windowed`]): in place of a tile windows about the eye, each twice as wide as the one before.
+    pub windows: WindowQuality,
     /// Whether texels of the tile have 16 bits a number instead of 8: twice the memory, for errors below a hundredth.
     pub wide: bool,
     /// Whether the march is drawn for half as many pixels a side, by [`Clouds::encode_volumes`], and laid over the picture by the four around each pixel whose rays end as far away.
@@ -88,11 +88,6 @@ impl CloudQuality {
             Preset::Medium => (192, 128, 64, 48, 8),
             _ => (384, 192, 64, 96, 16),
         };
-        let window_texels = match preset {
-            Preset::Low => 128,
-            Preset::Medium => 160,
-            _ => 256,
-        };
         CloudQuality {
             texels,
             first_texels,
@@ -102,7 +97,7 @@ impl CloudQuality {
             second_tile: true,
             frames: 30,
             cells: [32, cell_levels],
-            window_texels,
+            windows: WindowQuality::of(preset),
             wide: false,
             half: false,
             jitter: false,
@@ -130,10 +125,7 @@ impl CloudQuality {
                 return Err(fault(&format!("quality.{name}"), texels, domain));
             }
         }
-        if !(64..=512).contains(&self.window_texels) || !self.window_texels.is_multiple_of(32) {
-            let domain = "a multiple of 32 in [64, 512]";
-            return Err(fault("quality.window_texels", self.window_texels, domain));
-        }
+        self.windows.check()?;
         for (name, value, low, high) in [
             ("levels", self.levels, 2, 256),
             ("steps", self.steps, 1, 4096),
@@ -166,7 +158,7 @@ pub struct CloudsOptions {
     pub far: f64,
     /// Whether the host's depth buffer hides clouds; [`Clouds::set_host`] tells it.
     pub over_depth: bool,
-    /// Whether tile and place are kept up for views that cannot show the layer too, so that [`Clouds::shadow`] is that of every eye.
+    /// Whether tile and place are kept up for views that cannot show the layer too, so that [`Clouds::shadow`] is that of every eye. Refused for a layer with windows.
     pub shadows: bool,
     /// The air before the clouds, if they are to show it to eyes within the air; to those above it clouds show none: [`Clouds::set_air`] tells the tables of the sky that it is taken from. The picture below must have its air in it already.
     pub air: Option<Atmosphere>,
@@ -335,6 +327,13 @@ impl Clouds {
             texels.push(quality.texels);
         }
         let windowed = options.deck.is_windowed() && !options.deck.is_empty();
+        if windowed && options.shadows {
+            return Err(fault(
+                "options.shadows",
+                true,
+                "false for a layer of more than 4 doublings of the period: a host has no program that reads windows",
+            ));
+        }
         let windows = if windowed {
             Some(Windows::new(
                 device,
@@ -362,7 +361,17 @@ impl Clouds {
         )?;
         let all = options.orders == Orders::All;
         let orders = if all && !options.deck.is_empty() {
-            let table = OrderTable::new(device, programs, &options.deck, &tile, quality.cells)?;
+            let source = match &windows {
+                Some(windows) => windows.lit_source(),
+                None => Source {
+                    views: &tile.views,
+                    sampler: &tile.sampler,
+                    levels: tile.levels,
+                    least: tile.least,
+                    window: None,
+                },
+            };
+            let table = OrderTable::new(device, programs, &options.deck, &source, quality.cells)?;
             Some(table)
         } else {
             None
@@ -567,6 +576,12 @@ impl Clouds {
                         binding: 3,
                         resource: wgpu::BindingResource::TextureView(&table.view),
                     });
+                    if let Some(mean) = table.mean_view() {
+                        entries.push(wgpu::BindGroupEntry {
+                            binding: 5,
+                            resource: wgpu::BindingResource::TextureView(mean),
+                        });
+                    }
                 }
                 device.create_bind_group(&wgpu::BindGroupDescriptor {
                     label: Some("veduta clouds"),
@@ -698,7 +713,7 @@ impl Clouds {
     }
 
     /// What hosts need to shade their own things, for the eye of the last [`Clouds::prepare`]; none before the first, for a layer without clouds, whose shadow is 1 everywhere, and without
-    /// [`CloudsOptions::shadows`] for a view that cannot show the layer. Straight light alone: what the clouds scatter down is not in it.
+    /// [`CloudsOptions::shadows`] for a view that cannot show the layer; none for a layer with windows ([`CloudDeck::is_windowed`]). Straight light alone: what the clouds scatter down is not in it.
     pub fn shadow(&self) -> Option<CloudShadow<'_>> {
         if self.windows.is_some() {
             return None;
@@ -812,8 +827,16 @@ impl Clouds {
             // At night no tile is needed for where the sun goes.
             (self.last_sun, self.fresh) = (None, false);
         }
-        if let (Some(table), Some((shown, sun))) = (&mut self.orders, self.shown) {
-            let fresh = self.fresh;
+        if let (Some(table), Some((shown, mut sun))) = (&mut self.orders, self.shown) {
+            let mut fresh = self.fresh;
+            if let Some(windows) = &mut self.windows {
+                let lit = windows.lit(self.quality.cells[0]);
+                (fresh, sun) = (lit.fresh, lit.sun);
+                table.set_slot(lit.slot);
+                if lit.moved {
+                    table.renew();
+                }
+            }
             let swapped = before.is_some_and(|b| b.0 != shown);
             let baked = (shown, sun.to_array());
             table.advance(queue, encoder, baked, fresh, swapped, &mut work);

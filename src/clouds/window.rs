@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::{CloudDeck, CloudQuality};
+use super::{CloudDeck, CloudQuality, fault};
+use super::order_table::Source;
 use super::tile::slant;
 use crate::error::Error;
 use crate::exchange::compute;
@@ -10,6 +11,7 @@ use crate::landscape::Work;
 use crate::program::ProgramSet;
 use crate::programs::blocks::CloudWindows as WindowsBlock;
 use crate::programs::blocks::WindowPart as PartBlock;
+use crate::settings::Preset;
 use crate::view::WorldPos;
 
 /// Windows at most.
@@ -20,8 +22,6 @@ const STEP: i64 = 4;
 const SLACK: i64 = 4;
 /// Texels at the rim of a window that are not shown, for an eye out of its middle and the half texel that filtering takes.
 const MARGIN: f64 = SLACK as f64 + 2.0;
-/// Wavelengths that the edge of the finest window has at most, unless there were more than [`MOST`].
-const FINEST: f64 = 2.8;
 /// Rows of a part of a whole window, and of a strip along z.
 const ROWS: u32 = 16;
 const STRIP_ROWS: u32 = 64;
@@ -29,6 +29,51 @@ const STRIP_ROWS: u32 = 64;
 const GROWTH: f64 = 16.0;
 /// A part of a window takes a stretch of this much of the uniform buffer (bytes).
 const STRIDE: u64 = 256;
+
+/// How finely windows about the eye are baked, which take a tile's place for a layer that does not repeat near enough.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WindowQuality {
+    /// Texels of the edge of each window, a multiple of 32 in [64, 512].
+    pub texels: u32,
+    /// Levels of each window, in [2, 128].
+    pub levels: u32,
+    /// Texels of the finest window for each wavelength of the layer, at least, in [1, 1024]. There are as many windows as it takes from there to
+    /// [`CloudsOptions::far`](super::CloudsOptions::far), each with texels twice as wide, but at most seven: rays end with the widest.
+    pub fineness: u32,
+}
+
+impl WindowQuality {
+    /// That of a preset: `low`, `medium` and the rest.
+    pub fn of(preset: &Preset) -> WindowQuality {
+        let (texels, levels, fineness) = match preset {
+            Preset::Low => (160, 16, 32),
+            Preset::Medium => (320, 24, 48),
+            _ => (512, 32, 88),
+        };
+        WindowQuality {
+            texels,
+            levels,
+            fineness,
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<(), Error> {
+        if !(64..=512).contains(&self.texels) || !self.texels.is_multiple_of(32) {
+            let domain = "a multiple of 32 in [64, 512]";
+            return Err(fault("quality.windows.texels", self.texels, domain));
+        }
+        for (name, value, low, high) in [
+            ("levels", self.levels, 2, 128),
+            ("fineness", self.fineness, 1, 1024),
+        ] {
+            if !(low..=high).contains(&value) {
+                let domain = format!("in [{low}, {high}]");
+                return Err(fault(&format!("quality.windows.{name}"), value, &domain));
+            }
+        }
+        Ok(())
+    }
+}
 
 /// What a window holds.
 #[derive(Debug, Clone, Copy)]
@@ -59,8 +104,8 @@ pub(super) struct Windows {
     /// Bytes of a texel.
     texel: u32,
     pub least: f32,
-    /// Turns of the period that a texel of the finest window takes, of 2^32.
-    turn: u32,
+    /// Parts of the period that a texel of the finest window takes, of 2^32.
+    turn: u64,
     /// The period in 2^-20 m, as lattices count.
     period: i128,
     frames: u32,
@@ -82,6 +127,10 @@ pub(super) struct Windows {
     /// The place in the stack of the first window.
     first: usize,
     last_sun: Option<Vec3>,
+    /// What the cells of light of all orders were last filled from: the corner of their window, and its sun; none while it is begun anew.
+    lit_from: Option<([i64; 2], Vec3)>,
+    /// The window that they lie over.
+    lit: usize,
     /// Parts that this frame has baked, and columns that it may bake yet.
     used: usize,
     budget: i64,
@@ -109,22 +158,26 @@ impl Place {
 }
 
 /// How many windows there are, and the turns of a texel of the finest, for rays that end at a distance.
-fn sizes(deck: &CloudDeck, texels: u32, levels: u32, far: f64) -> (u32, u32) {
+fn sizes(deck: &CloudDeck, quality: &WindowQuality, far: f64) -> (u32, u64) {
+    let WindowQuality {
+        texels,
+        levels,
+        fineness,
+    } = *quality;
     let rise = f64::from(deck.lowest_sun(levels));
     let across = 0.5 * deck.thickness * (1.0 / (rise * rise) - 1.0).max(0.0).sqrt();
     let held = 1.0 - 2.0 * MARGIN / f64::from(texels);
-    let period = deck.period();
-    let widest = (2.0 * (far + across) / held).min(period);
-    let doublings = (widest / (FINEST * deck.wavelength)).log2().ceil();
+    let finest = f64::from(texels) * deck.wavelength / f64::from(fineness);
+    let widest = (2.0 * (far + across) / held).min(finest * f64::from(1_u32 << (MOST - 1)));
+    let doublings = (widest / finest).log2().ceil();
     let count = doublings.clamp(0.0, f64::from(MOST - 1)) as u32 + 1;
-    let finest = widest / f64::from(1_u32 << (count - 1)) / f64::from(texels);
-    let most = 2.0_f64.powi(32) / (f64::from(texels) * f64::from(1_u32 << (count - 1)));
-    let turn = (finest / period * 2.0_f64.powi(32)).ceil().min(most.floor());
-    (count, turn.max(1.0) as u32)
+    let texel = widest / f64::from(1_u32 << (count - 1)) / f64::from(texels);
+    let turn = (texel / deck.period() * 2.0_f64.powi(32)).round();
+    (count, turn.max(1.0) as u64)
 }
 
 impl Windows {
-    /// Makes room for windows, for rays that end at `far` (m) unless the period is shorter.
+    /// Makes room for windows, for rays that end at `far` (m).
     pub fn new(
         device: &wgpu::Device,
         programs: &ProgramSet,
@@ -132,14 +185,9 @@ impl Windows {
         quality: &CloudQuality,
         far: f64,
     ) -> Result<Windows, Error> {
-        let CloudQuality {
-            window_texels: texels,
-            levels,
-            wide,
-            frames,
-            ..
-        } = *quality;
-        let (count, turn) = sizes(deck, texels, levels, far);
+        let CloudQuality { wide, frames, .. } = *quality;
+        let WindowQuality { texels, levels, .. } = quality.windows;
+        let (count, turn) = sizes(deck, &quality.windows, far);
         let bits: &[&str] = if wide { &["CLOUD_WIDE"] } else { &[] };
         let flags = [deck.flags(), bits].concat();
         let (pipeline, layouts) = compute(device, programs, "cloud_window", &flags, &[])?;
@@ -237,6 +285,8 @@ impl Windows {
             turning: None,
             first: 0,
             last_sun: None,
+            lit_from: None,
+            lit: lit_window(deck, texels, count, turn),
             used: 0,
             budget: 0,
         })
@@ -262,7 +312,7 @@ impl Windows {
 
     /// Edge of a texel of a window (m).
     fn texel_size(&self, window: usize) -> f64 {
-        let turns = u64::from(self.turn) << window;
+        let turns = self.turn << window;
         turns as f64 * self.period as f64 / UNIT / 2.0_f64.powi(32)
     }
 
@@ -312,6 +362,49 @@ impl Windows {
         self.turning.is_some_and(|t| window >= t.turned)
     }
 
+    /// What cells of light of all orders are filled from.
+    pub fn lit_source(&self) -> Source<'_> {
+        let edge = f64::from(self.texels) * self.texel_size(self.lit);
+        Source {
+            views: std::slice::from_ref(&self.view),
+            sampler: &self.sampler,
+            levels: self.levels,
+            least: self.least,
+            window: Some((edge, self.count() as u32 + 1)),
+        }
+    }
+
+    /// What has become of the window that so many cells of light of all orders lie over since they were last asked for.
+    pub fn lit(&mut self, cells: u32) -> Lit {
+        let window = self.windows[self.lit];
+        let turned = self.is_turned(self.lit);
+        let next = self.turning.filter(|_| turned).map(|t| t.to_sun);
+        let sun = next.or(self.sun).unwrap_or(Vec3::Y);
+        let mut lit = Lit {
+            slot: self.slot(self.lit, turned),
+            sun,
+            fresh: false,
+            moved: false,
+        };
+        if window.rows < self.texels {
+            // Until there is something to see the cells keep what they have.
+            self.lit_from = None;
+            return lit;
+        }
+        let cell = i64::from(self.texels / cells).max(1);
+        match self.lit_from {
+            None => lit.fresh = true,
+            Some((corner, from)) => {
+                let off = |a: usize| (window.corner[a] - corner[a]).abs();
+                lit.moved = off(0) >= cell || off(1) >= cell || from != sun;
+            }
+        }
+        if lit.fresh || lit.moved {
+            self.lit_from = Some((window.corner, sun));
+        }
+        lit
+    }
+
     /// Brings the windows up to the eye and the sun, and tells the march of them. Returns whether all were begun anew.
     pub fn advance(
         &mut self,
@@ -341,8 +434,10 @@ impl Windows {
         if fresh {
             // The first frame, or a sun that has jumped.
             (self.sun, self.turning) = (Some(to_sun), None);
+            self.lit_from = None;
             for k in (0..self.count()).rev() {
                 let corner = self.corner_about(place.over(k));
+                baker.work.bakes += 1;
                 self.whole(&mut baker, k, corner, [0, self.texels], None);
                 self.windows[k] = Window {
                     corner,
@@ -541,7 +636,8 @@ impl Windows {
         let (shear, slant) = slant(to_sun.to_array(), deck.lowest_sun(self.levels));
         let shape = deck.shape.clone().unwrap_or_default();
         let n = i64::from(self.texels);
-        let texel_turn = self.turn << k;
+        // Whole turns are none.
+        let texel_turn = (self.turn << k) as u32;
         let block = PartBlock {
             shear,
             turn: corner.map(|c| (c as u32).wrapping_mul(texel_turn)),
@@ -661,6 +757,9 @@ impl Windows {
             extinction: deck.extinction as f32,
             clear: deck.clear_way() as f32,
             least: self.least,
+            lit_scale: f64::from(1_u32 << (count - 1 - self.lit)) as f32,
+            lit_near: (0.6 * self.half(self.lit)) as f32,
+            lit_wide: (0.85 * self.half(self.lit)) as f32,
             ..Default::default()
         };
         let bytes = block.to_bytes().to_vec();
@@ -678,6 +777,28 @@ impl Windows {
         let across = 0.5 * deck.thickness * (1.0 / (rise * rise) - 1.0).max(0.0).sqrt();
         (self.half(self.count() - 1) - across).max(0.0)
     }
+}
+
+/// The window that cells of light of all orders lie over, and what is new of it.
+pub(super) struct Lit {
+    pub slot: usize,
+    /// The sun that it was baked for.
+    pub sun: Vec3,
+    /// Whether it has been begun anew.
+    pub fresh: bool,
+    /// Whether it has moved by a cell, or was baked for another sun.
+    pub moved: bool,
+}
+
+/// The first window that is at least four wavelengths wide, or the last.
+fn lit_window(deck: &CloudDeck, texels: u32, count: u32, turn: u64) -> usize {
+    let edge = |k: u32| {
+        let turns = (turn << k) as f64 * f64::from(texels);
+        turns / 2.0_f64.powi(32) * deck.period()
+    };
+    (0..count - 1)
+        .find(|k| edge(*k) >= 4.0 * deck.wavelength)
+        .unwrap_or(count - 1) as usize
 }
 
 /// What baking needs beside the windows.

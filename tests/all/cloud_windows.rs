@@ -1,10 +1,12 @@
 //! Windows about the eye on layers of clouds that do not repeat.
 
-use crate::cloud_frames::{RADIUS, over_black, stretches, targets};
+use crate::cloud_frames::{over_black, stretches, targets};
 use crate::common::gpu;
-use veduta::clouds::{CloudDeck, CloudLights, CloudQuality, Clouds, CloudsOptions, Orders};
+use veduta::clouds::{
+    CloudDeck, CloudLights, CloudQuality, Clouds, CloudsOptions, Orders, WindowQuality,
+};
 use veduta::glam::{DVec3, Vec3};
-use veduta::reference::planet;
+use veduta::reference::volume::{self, VolumePaths};
 use veduta::view::direction;
 use veduta::{Preset, View, Work, WorldPos};
 
@@ -35,8 +37,11 @@ fn clouds(quality: CloudQuality, deck: CloudDeck, orders: Orders) -> Clouds {
 /// Small windows, for questions of which texels there are.
 fn small() -> CloudQuality {
     CloudQuality {
-        window_texels: 64,
-        levels: 8,
+        windows: WindowQuality {
+            texels: 64,
+            levels: 8,
+            fineness: 23,
+        },
         frames: 8,
         ..CloudQuality::of(&Preset::Low)
     }
@@ -80,14 +85,14 @@ fn apart(one: &[[f32; 4]], other: &[[f32; 4]]) -> (f32, f64) {
     (most, (square / power).sqrt())
 }
 
-/// Light and transmittance of pixels against a march in `f64` over the noise itself, at the origin, 10000 km from it and in between, near and far clouds, with and without wind.
+/// Light and transmittance of pixels, by `march_windows` and `window_at`, against a march in `f64` over the noise itself, at the origin, 10000 km from it and in between, near and far clouds, with and without wind.
 #[test]
 fn windows_meet_the_march_near_and_far_from_the_origin() {
     let (columns, rows) = (64, 36);
     for (place, pitch, field_of_view, most) in [
-        ([100.0, -300.0], 0.9, 0.7, 0.05),
-        ([1.0e7 + 777.0, -1.0e7 + 333.0], 0.9, 0.7, 0.05),
-        ([-54_321.0, 1.0e7], 0.2, 0.2, 0.1),
+        ([100.0, -300.0], 0.9, 0.7, 0.06),
+        ([1.0e7 + 777.0, -1.0e7 + 333.0], 0.9, 0.7, 0.06),
+        ([-54_321.0, 1.0e7], 0.2, 0.2, 0.11),
     ] {
         let deck = CloudDeck {
             wind: [12.5, -7.25],
@@ -103,7 +108,11 @@ fn windows_meet_the_march_near_and_far_from_the_origin() {
         let to_sun = view.sun.to_light.as_dvec3().normalize().to_array();
         let quality = CloudQuality {
             steps: 128,
-            window_texels: 384,
+            windows: WindowQuality {
+                texels: 512,
+                levels: 64,
+                fineness: 128,
+            },
             ..CloudQuality::of(&Preset::High)
         };
         let mut clouds = clouds(quality, deck.clone(), Orders::Single);
@@ -152,7 +161,6 @@ fn windows_meet_the_march_near_and_far_from_the_origin() {
     };
     let (_, off) = apart(&picture(0.0), &picture(16_000.0));
     assert!(off > 0.3, "{off}");
-    let _ = planet::altitude_of(RADIUS, 0.0, [0.0; 3]);
 }
 
 /// Nothing is baked for an eye that stands, turns, or goes to and fro by less than a strip; for one that flies, what it uncovers.
@@ -203,7 +211,7 @@ fn windows_hold_nothing_stale() {
     let origin = DVec3::new(4.0e6, 300.0, -7.0e6);
     let mut flown = clouds(quality, endless(), Orders::Single);
     let mut eye = origin;
-    let mut check = |flown: &mut Clouds, eye: DVec3, what: &str| {
+    let check = |flown: &mut Clouds, eye: DVec3, what: &str| {
         for (yaw, pitch) in [(0.3, 0.5), (2.4, 0.15), (4.4, 0.15)] {
             let view = view_from(eye, yaw, pitch, 1.2);
             let shown = over_black(flown, &view, &ALONE);
@@ -303,19 +311,180 @@ fn windows_follow_the_sun() {
         if k % 30 == 29 {
             let (_, off) = apart(&over_black(&mut clouds, &view, &ALONE), &fresh(&view));
             println!("frame {k} of a flight under a sun that moves: {off:.4} off");
-            assert!(off < 0.05, "{off}");
+            assert!(off < 0.12, "{off}");
         }
     }
+    // When both come to rest nothing of the way is left.
+    let mut rest = under(0.46);
+    rest.eye = rest.eye.moved_by(DVec3::new(50_000.0, 0.0, -30_000.0));
+    let mut frames = 0;
+    while advance(&mut clouds, &rest).dispatches > 0 {
+        frames += 1;
+        assert!(frames < 300);
+    }
+    let (most, _) = apart(&over_black(&mut clouds, &rest, &ALONE), &fresh(&rest));
+    assert!(most < 4e-3, "{most}");
 }
 
 /// What presets keep on the device, at most.
 #[test]
 fn windows_keep_to_the_memory_of_the_presets() {
     for (preset, most) in [(Preset::Low, 12), (Preset::Medium, 32), (Preset::High, 96)] {
-        let clouds = clouds(CloudQuality::of(&preset), endless(), Orders::Single);
+        let clouds = clouds(CloudQuality::of(&preset), endless(), Orders::All);
         let held = clouds.resources();
         let mib = (held.texture_bytes + held.buffer_bytes) as f64 / f64::from(1 << 20);
         println!("{preset:?}: {mib:.1} MiB");
         assert!(mib < f64::from(most), "{preset:?}: {mib} MiB");
+    }
+}
+
+/// `march_windows_orders` with `window_cells_at` against paths, near, and so far that the mean of the cells stands for them; and after a flight the light of the place flown to.
+#[test]
+fn light_of_all_orders_in_windows_meets_paths() {
+    let (columns, rows) = (64, 36);
+    for (pitch, field_of_view) in [(0.7, 0.9), (0.3, 0.3)] {
+        let mut clouds = clouds(CloudQuality::of(&Preset::High), endless(), Orders::All);
+        let view = view_from(DVec3::new(0.0, 300.0, 0.0), 0.4, pitch, field_of_view);
+        let to_sun = view.sun.to_light.as_dvec3().normalize().to_array();
+        for _ in 0..300 {
+            if advance(&mut clouds, &view).dispatches == 0 {
+                break;
+            }
+        }
+        let shown = over_black(&mut clouds, &view, &ALONE);
+        let [middle, right, up] = view.rays().unwrap();
+        let (mut pixels, mut list) = (Vec::new(), Vec::new());
+        for (y, x) in (2..rows)
+            .step_by(4)
+            .flat_map(|y| (2..columns).step_by(4).map(move |x| (y, x)))
+        {
+            let at = |k: u32, n: u32| (2 * k + 1) as f32 / n as f32 - 1.0;
+            let dir = middle + at(x, columns) * right - at(y, rows) * up;
+            pixels.push((y * columns + x) as usize);
+            list.push(veduta::atmosphere::ProbeRay {
+                altitude: 300.0,
+                dir: dir.as_dvec3().normalize().to_array(),
+                to_sun,
+                distance: 80_000.0,
+            });
+        }
+        let paths = VolumePaths {
+            samples: 128,
+            ..Default::default()
+        };
+        let truth = volume::layer_light(&endless(), &list, Orders::All, &paths);
+        let found = |k: usize| f64::from(shown[pixels[k]][1]);
+        let count = list.len() as f64;
+        let mean: f64 = truth.iter().map(|t| t[0]).sum::<f64>() / count;
+        let noise = truth.iter().map(|t| t[1] * t[1]).sum::<f64>().sqrt() / count / mean;
+        let off = (0..list.len()).map(found).sum::<f64>() / count / mean - 1.0;
+        // Blocks of two by two rays.
+        let (mut square, mut noisy, mut blocks) = (0.0, 0.0, 0.0);
+        let rms = (truth.iter().map(|t| t[0] * t[0]).sum::<f64>() / count).sqrt();
+        for k in 0..4 {
+            for i in 0..8 {
+                let members =
+                    [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| (2 * k + y) * 16 + 2 * i + x);
+                let part: f64 = members.iter().map(|m| found(*m) - truth[*m][0]).sum();
+                square += (part / 4.0).powi(2);
+                noisy += members.iter().map(|m| truth[*m][1].powi(2)).sum::<f64>() / 16.0;
+                blocks += 1.0;
+            }
+        }
+        let [square, noisy] = [square, noisy].map(|s: f64| (s / blocks).sqrt() / rms);
+        println!("{pitch} up: mean {off:+.3} (noise {noise:.3}), blocks {square:.3} (noise {noisy:.3})");
+        assert!(off.abs() < 0.1 + 2.0 * noise, "{off} {noise}");
+        assert!(
+            square < (0.2_f64.powi(2) + noisy * noisy).sqrt(),
+            "{square}"
+        );
+        // Flown away and back to rest there: as light as if begun there.
+        let mut away = view;
+        for _ in 0..40 {
+            away.eye = away.eye.moved_by(DVec3::new(300.0, 0.0, -450.0));
+            let _ = advance(&mut clouds, &away);
+        }
+        let flown_at_once = over_black(&mut clouds, &away, &ALONE);
+        let mut frames = 0;
+        while advance(&mut clouds, &away).dispatches > 0 {
+            frames += 1;
+            assert!(frames < 600);
+        }
+        let mut fresh = self::clouds(CloudQuality::of(&Preset::High), endless(), Orders::All);
+        while advance(&mut fresh, &away).dispatches > 0 {}
+        let fresh = over_black(&mut fresh, &away, &ALONE);
+        let (_, early) = apart(&flown_at_once, &fresh);
+        let (_, late) = apart(&over_black(&mut clouds, &away, &ALONE), &fresh);
+        println!("flown 22 km in 40 frames {early:.4} off, at rest there after {frames} frames {late:.4}");
+        assert!(late < 0.03, "{late}");
+        assert!(early < 0.2, "{early}");
+    }
+}
+
+#[test]
+fn what_windows_cannot_do_is_refused() {
+    let new = |options: &CloudsOptions| {
+        Clouds::new(&gpu().device, veduta::programs(), &targets(), options)
+            .unwrap_err()
+            .to_string()
+    };
+    let options = CloudsOptions {
+        quality: small(),
+        deck: endless(),
+        orders: Orders::Single,
+        ..Default::default()
+    };
+    let text = new(&CloudsOptions {
+        shadows: true,
+        ..options.clone()
+    });
+    assert!(text.contains("options.shadows"), "{text}");
+    let with = |windows: WindowQuality| {
+        new(&CloudsOptions {
+            quality: CloudQuality { windows, ..small() },
+            ..options.clone()
+        })
+    };
+    let good = small().windows;
+    for (windows, name) in [
+        (WindowQuality { texels: 100, ..good }, "windows.texels"),
+        (WindowQuality { texels: 544, ..good }, "windows.texels"),
+        (WindowQuality { levels: 1, ..good }, "windows.levels"),
+        (WindowQuality { fineness: 0, ..good }, "windows.fineness"),
+    ] {
+        let text = with(windows);
+        assert!(text.contains(name), "{text}");
+    }
+    // No shadow is told that a tile's reader would take for one.
+    let mut clouds = clouds(small(), endless(), Orders::Single);
+    let _ = advance(&mut clouds, &view_from(DVec3::ZERO, 0.0, 0.5, 1.0));
+    assert!(clouds.shadow().is_none());
+}
+
+/// Pictures of layers with forms, of wide numbers, from within, above and far away, with the sun high and low, hold no value that is not finite.
+#[test]
+fn windows_of_every_kind_are_finite() {
+    for (k, name) in ["fair", "towers", "stratus", "thesis"].into_iter().enumerate() {
+        let deck = CloudDeck {
+            period_doublings: 5 + 2 * k as u32,
+            ..CloudDeck::named(name).unwrap()
+        };
+        let quality = CloudQuality {
+            wide: k % 2 == 1,
+            ..small()
+        };
+        let inside = deck.bottom + 0.5 * deck.thickness;
+        let mut clouds = clouds(quality, deck, Orders::Single);
+        for altitude in [0.0, inside, 12_000.0, 400_000.0] {
+            for sun in [1.5, 0.3, 0.0, -0.2] {
+                let mut view = view_from(DVec3::new(-3e9, altitude, 5e8), 1.0, 0.0, 1.5);
+                view.sun.to_light = direction(sun, 1.0).as_vec3();
+                let shown = over_black(&mut clouds, &view, &ALONE);
+                assert!(
+                    shown.iter().flatten().all(|v| v.is_finite() && *v >= 0.0),
+                    "{name} {altitude} {sun}"
+                );
+            }
+        }
     }
 }
