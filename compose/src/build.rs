@@ -69,7 +69,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         "terrain_rays" | "terrain_globe_rays" => {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
-        "cloud_tile" => {
+        "cloud_tile" | "cloud_window" => {
             let kinds = [vec![], vec!["CLOUD_SHAPED"]];
             return [vec![], vec!["CLOUD_WIDE"]]
                 .iter()
@@ -110,13 +110,18 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             let drawn = airs
                 .iter()
                 .flat_map(|air| ways.iter().map(move |way| set(way, air)));
+            let windowed = airs.iter().flat_map(|air| {
+                let own = [&["CLOUD_WINDOW"], *air].concat();
+                ways.iter().map(move |way| set(way, &own))
+            });
             let laid: [&[&str]; 2] = [&[], &["CLOUD_OVER_DEPTH"]];
             return drawn
+                .chain(windowed)
                 .chain(laid.iter().map(|way| set(&["CLOUD_UPSAMPLE"], way)))
                 .collect();
         }
         "cloud_volume" => {
-            let ways: [&[&str]; 13] = [
+            let ways: [&[&str]; 15] = [
                 &[],
                 &["CLOUD_READS_NODES"],
                 &["CLOUD_NODES"],
@@ -130,6 +135,8 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 &["CLOUD_LAYERED", "CLOUD_GATHER"],
                 &["CLOUD_LAYERED", "CLOUD_GATHER", "CLOUD_PROLONG"],
                 &["CLOUD_LAYERED", "CLOUD_PUBLISH"],
+                &["CLOUD_LAYERED", "CLOUD_CELLS", "CLOUD_WINDOW"],
+                &["CLOUD_LAYERED", "CLOUD_PUBLISH", "CLOUD_WINDOW"],
             ];
             let set = |flags: &&[&str]| flags.iter().map(|f| (*f).to_owned()).collect();
             return ways.iter().map(set).collect();

@@ -177,6 +177,11 @@ impl CloudDeck {
         self.wavelength * f64::from(self.period_doublings.min(31)).exp2()
     }
 
+    /// Whether its period is so long, more than 16 wavelengths, that [`super::Clouds`] bakes windows about the eye instead of a tile of the whole.
+    pub fn is_windowed(&self) -> bool {
+        self.period_doublings > 4
+    }
+
     /// Sine of the lowest height of the sun that a tile of so many levels is baked for, at least [`super::LOWEST_SUN`]: columns of the tile follow the sun's rays, which between
     /// two levels go at most a twelfth of a wavelength across. A lower sun is taken to be that high.
     pub fn lowest_sun(&self, levels: u32) -> f32 {

@@ -1,7 +1,7 @@
 //! The table of light that was scattered before, which `Clouds` reads beside its tile: solved by sweeps over the cells of a period, in shares of frames.
 
 use super::layer_orders::{block_of, held, ways};
-use super::tile::{Tile, slant};
+use super::tile::slant;
 use super::volume::{Kernel, dispatch, groups, room};
 use super::{CloudDeck, fault};
 use crate::error::Error;
@@ -19,6 +19,10 @@ const FIRST_SWEEPS: [u32; KINDS] = [20, 8, 8];
 const SWEEPS: [u32; KINDS] = [24, 16, 16];
 /// Sweeps after a sun that has gone on.
 const NEXT_SWEEPS: u32 = 12;
+/// Sweeps after a window has moved.
+const MOVED_SWEEPS: [u32; KINDS] = [12, 8, 8];
+/// Bytes of a level in the buffer of means: copies want multiples of 256.
+const MEAN_ROW: u32 = 256;
 /// Frames that a sweep takes, and one more for what cells scatter of it.
 const SHARES: u32 = 4;
 /// Frames that a new tile takes to fill the cells.
@@ -27,6 +31,26 @@ const DIRECTIONS: u32 = 24;
 /// How far texels go in a frame to what the cells have found, and for how many frames after it was found: what is left then is 0.4 %.
 const EASE: f32 = 0.17;
 const SETTLING: u32 = 30;
+
+/// What cells are filled from: tiles, or a window in a stack.
+pub(super) struct Source<'a> {
+    pub views: &'a [wgpu::TextureView],
+    pub sampler: &'a wgpu::Sampler,
+    pub levels: u32,
+    pub least: f32,
+    /// Edge of the window (m) and places in the stack.
+    pub window: Option<(f64, u32)>,
+}
+
+/// The mean of the cells of each level, for what lies beyond a window.
+#[derive(Debug)]
+struct Mean {
+    kernel: Kernel,
+    groups: Vec<wgpu::BindGroup>,
+    staging: wgpu::Buffer,
+    texture: wgpu::Texture,
+    view: wgpu::TextureView,
+}
 
 /// Light of one kind in the cells of a grid.
 #[derive(Debug)]
@@ -47,6 +71,8 @@ struct Kind {
 struct Grid {
     shape: [i32; 3],
     uniform: wgpu::Buffer,
+    /// Extinction and light of each cell.
+    cells: wgpu::Buffer,
     /// By tile.
     fill: Vec<Vec<wgpu::BindGroup>>,
     kinds: Vec<Kind>,
@@ -56,7 +82,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn cells(&self) -> u32 {
+    fn count(&self) -> u32 {
         self.shape.iter().product::<i32>() as u32
     }
 }
@@ -72,6 +98,7 @@ pub(super) struct OrderTable {
     publish: Kernel,
     grids: [Grid; 2],
     publishing: Vec<wgpu::BindGroup>,
+    mean: Option<Mean>,
     staging: wgpu::Buffer,
     texture: wgpu::Texture,
     pub view: wgpu::TextureView,
@@ -93,6 +120,8 @@ pub(super) struct OrderTable {
     at: (usize, u32),
     /// Frames until texels have gone on to what the cells have found.
     settling: u32,
+    /// Whether cells are to be filled anew when they are full.
+    again: bool,
 }
 
 impl OrderTable {
@@ -101,15 +130,21 @@ impl OrderTable {
         device: &wgpu::Device,
         programs: &ProgramSet,
         deck: &CloudDeck,
-        tile: &Tile,
+        tile: &Source<'_>,
         [edge, levels]: [u32; 2],
     ) -> Result<OrderTable, Error> {
-        let (block, lobes) = block_of(deck, tile.levels, tile.least);
+        let (mut block, lobes) = block_of(deck, tile.levels, tile.least);
+        if let Some((edge, slots)) = tile.window {
+            (block.size, block.slots) = (edge as f32, slots as f32);
+        }
         let kernel = |flags: &[&str]| {
             let flags: Vec<&str> = [&["CLOUD_LAYERED"], flags].concat();
             compute(device, programs, "cloud_volume", &flags, &[])
         };
-        let fill = kernel(&["CLOUD_CELLS"])?;
+        let fill = match tile.window {
+            Some(_) => kernel(&["CLOUD_CELLS", "CLOUD_WINDOW"])?,
+            None => kernel(&["CLOUD_CELLS"])?,
+        };
         let sweep = kernel(&["CLOUD_SWEEP"])?;
         let gather = kernel(&["CLOUD_GATHER"])?;
         let prolong = kernel(&["CLOUD_GATHER", "CLOUD_PROLONG"])?;
@@ -149,7 +184,7 @@ impl OrderTable {
                 .iter()
                 .map(|view| {
                     let seen = vec![
-                        (0, wgpu::BindingResource::Sampler(&tile.sampler)),
+                        (0, wgpu::BindingResource::Sampler(tile.sampler)),
                         (1, wgpu::BindingResource::TextureView(view)),
                     ];
                     groups(device, &fill, &[head.clone(), seen, held(&[(1, &cells)])])
@@ -197,6 +232,7 @@ impl OrderTable {
                 groups: 3
                     * (by_tile.len() + kinds.len() * (2 + usize::from(coarser.is_some()))) as u32,
                 uniform: own,
+                cells,
                 fill: by_tile,
                 kinds,
             })
@@ -236,6 +272,44 @@ impl OrderTable {
                 held(&[(7, &staging)]),
             ],
         );
+        let mean = if tile.window.is_some() {
+            let kernel = kernel(&["CLOUD_PUBLISH", "CLOUD_WINDOW"])?;
+            let staging = room(
+                device,
+                (MEAN_ROW * levels) as usize,
+                Usage::STORAGE | Usage::COPY_SRC,
+            );
+            let read = held(&[
+                (3, &fine.cells),
+                (9, &sun.moments),
+                (10, &above.moments),
+                (11, &below.moments),
+            ]);
+            let head = vec![(0, sun.uniform.as_entire_binding())];
+            let texture = device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("veduta cloud orders, means"),
+                size: wgpu::Extent3d {
+                    width: 1,
+                    height: 1,
+                    depth_or_array_layers: levels,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D3,
+                format: wgpu::TextureFormat::Rgba16Float,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+                view_formats: &[],
+            });
+            Some(Mean {
+                groups: groups(device, &kernel, &[head, read, held(&[(7, &staging)])]),
+                view: texture.create_view(&Default::default()),
+                kernel,
+                staging,
+                texture,
+            })
+        } else {
+            None
+        };
         let weights = WeightsBlock {
             pairs: lobes.sun_weights(),
         };
@@ -250,6 +324,7 @@ impl OrderTable {
             texture,
             staging,
             publishing,
+            mean,
             grids: [coarse, fine],
             block,
             fill,
@@ -261,17 +336,38 @@ impl OrderTable {
             left: [0; KINDS],
             at: (0, 0),
             settling: 0,
+            again: false,
         })
+    }
+
+    /// The mean of the cells of each level, of a table over a window.
+    pub fn mean_view(&self) -> Option<&wgpu::TextureView> {
+        self.mean.as_ref().map(|mean| &mean.view)
+    }
+
+    /// Tells where in the stack the window lies now.
+    pub fn set_slot(&mut self, slot: usize) {
+        self.block.slot = slot as f32;
+    }
+
+    /// Fills the cells anew and goes on from the light that they have, of all kinds: for a window that has moved.
+    pub fn renew(&mut self) {
+        self.again = true;
     }
 
     /// Bytes in textures and in buffers, buffers, bind groups.
     pub fn holds(&self) -> (u64, u64, u32, u32) {
         let grids = &self.grids;
+        let mean = self.mean.as_ref().map_or(0, |mean| mean.staging.size());
+        let more = u32::from(self.mean.is_some());
         (
-            self.staging.size(),
-            self.staging.size() + self.weights.size() + grids.iter().map(|g| g.bytes).sum::<u64>(),
-            2 + grids.iter().map(|g| g.buffers).sum::<u32>(),
-            3 + grids.iter().map(|g| g.groups).sum::<u32>(),
+            self.staging.size() + mean / u64::from(MEAN_ROW) * 8,
+            self.staging.size()
+                + mean
+                + self.weights.size()
+                + grids.iter().map(|g| g.bytes).sum::<u64>(),
+            2 + more + grids.iter().map(|g| g.buffers).sum::<u32>(),
+            3 + 3 * more + grids.iter().map(|g| g.groups).sum::<u32>(),
         )
     }
 
@@ -295,8 +391,14 @@ impl OrderTable {
             self.left[0] = self.left[0].max(NEXT_SWEEPS);
         }
         let mut told = false;
+        if self.again && self.filled >= FILLS {
+            (self.filled, self.again) = (0, false);
+            for (left, sweeps) in self.left.iter_mut().zip(MOVED_SWEEPS) {
+                *left = sweeps.max(*left);
+            }
+        }
         if self.filled < FILLS {
-            let cells = self.grids[1].cells();
+            let cells = self.grids[1].count();
             let first = self.filled * cells / FILLS;
             let count = (self.filled + 1) * cells / FILLS - first;
             self.fill(queue, encoder, 1, (shown, to_sun), [first, count], work);
@@ -335,7 +437,7 @@ impl OrderTable {
             self.at.1 += 1;
             return;
         }
-        let count = grid.cells() as usize;
+        let count = grid.count() as usize;
         dispatch(encoder, &self.gather, &light.gather, count.div_ceil(64));
         work.dispatches += 1;
         self.settling = SETTLING;
@@ -360,7 +462,7 @@ impl OrderTable {
         // What is shown first is what is found first.
         self.settling = u32::MAX;
         for grid in [0, 1] {
-            let count = self.grids[grid].cells();
+            let count = self.grids[grid].count();
             self.fill(queue, encoder, grid, tile, [0, count], work);
             for kind in 0..KINDS {
                 self.upload(queue, grid, kind, tile.1, 0, work);
@@ -369,7 +471,7 @@ impl OrderTable {
         let [coarse, fine] = &self.grids;
         for (kind, sweeps) in FIRST_SWEEPS.into_iter().enumerate() {
             let light = &coarse.kinds[kind];
-            let count = coarse.cells() as usize;
+            let count = coarse.count() as usize;
             // Half of what is around, deep within; none of the sun's.
             let start = if kind == 0 { 0.0 } else { 0.5 * self.even };
             let bytes = start.to_le_bytes().repeat(24 * count);
@@ -384,7 +486,7 @@ impl OrderTable {
                 work.dispatches += 2;
             }
             let finer = &fine.kinds[kind];
-            let count = fine.cells() as usize;
+            let count = fine.count() as usize;
             dispatch(encoder, &self.prolong, &finer.prolong, count.div_ceil(64));
             work.dispatches += 1;
         }
@@ -465,7 +567,7 @@ impl OrderTable {
         if upload {
             self.upload(queue, 1, 0, to_sun, 0, work);
         }
-        let count = self.grids[1].cells() as usize;
+        let count = self.grids[1].count() as usize;
         dispatch(encoder, &self.publish, &self.publishing, count.div_ceil(64));
         work.dispatches += 1;
         let size = self.texture.size();
@@ -481,6 +583,24 @@ impl OrderTable {
             self.texture.as_image_copy(),
             size,
         );
+        if let Some(mean) = &self.mean {
+            let size = mean.texture.size();
+            let levels = size.depth_or_array_layers as usize;
+            dispatch(encoder, &mean.kernel, &mean.groups, levels.div_ceil(64));
+            work.dispatches += 1;
+            encoder.copy_buffer_to_texture(
+                wgpu::TexelCopyBufferInfo {
+                    buffer: &mean.staging,
+                    layout: wgpu::TexelCopyBufferLayout {
+                        offset: 0,
+                        bytes_per_row: Some(MEAN_ROW),
+                        rows_per_image: Some(1),
+                    },
+                },
+                mean.texture.as_image_copy(),
+                size,
+            );
+        }
     }
 }
 

@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
-use super::order_table::{OrderTable, check_cells};
+use super::order_table::{OrderTable, Source, check_cells};
 use super::tile::{Tile, slant};
+use super::window::{WindowQuality, Windows};
 use super::{AirLights, CloudDeck, Orders, fault};
 use crate::atmosphere::{Atmosphere, SkyTables};
 use crate::error::Error;
@@ -68,6 +69,8 @@ pub struct CloudQuality {
     pub frames: u32,
     /// Cells along the edge of the table of light of all orders, a multiple of 32 in [32, 128], and along its height, in [2, 64].
     pub cells: [u32; 2],
+    /// Of a layer that does not repeat near enough ([`CloudDeck::is_windowed`]): in place of a tile windows about the eye, each twice as wide as the one before.
+    pub windows: WindowQuality,
     /// Whether texels of the tile have 16 bits a number instead of 8: twice the memory, for errors below a hundredth.
     pub wide: bool,
     /// Whether the march is drawn for half as many pixels a side, by [`Clouds::encode_volumes`], and laid over the picture by the four around each pixel whose rays end as far away.
@@ -94,6 +97,7 @@ impl CloudQuality {
             second_tile: true,
             frames: 30,
             cells: [32, cell_levels],
+            windows: WindowQuality::of(preset),
             wide: false,
             half: false,
             jitter: false,
@@ -121,6 +125,7 @@ impl CloudQuality {
                 return Err(fault(&format!("quality.{name}"), texels, domain));
             }
         }
+        self.windows.check()?;
         for (name, value, low, high) in [
             ("levels", self.levels, 2, 256),
             ("steps", self.steps, 1, 4096),
@@ -153,7 +158,7 @@ pub struct CloudsOptions {
     pub far: f64,
     /// Whether the host's depth buffer hides clouds; [`Clouds::set_host`] tells it.
     pub over_depth: bool,
-    /// Whether tile and place are kept up for views that cannot show the layer too, so that [`Clouds::shadow`] is that of every eye.
+    /// Whether tile and place are kept up for views that cannot show the layer too, so that [`Clouds::shadow`] is that of every eye. Refused for a layer with windows.
     pub shadows: bool,
     /// The air before the clouds, if they are to show it to eyes within the air; to those above it clouds show none: [`Clouds::set_air`] tells the tables of the sky that it is taken from. The picture below must have its air in it already.
     pub air: Option<Atmosphere>,
@@ -204,7 +209,10 @@ pub struct Clouds {
     quality: CloudQuality,
     far: f64,
     depth: Depth,
+    /// As good as none where there are windows.
     tile: Tile,
+    /// For a layer that does not repeat near enough.
+    windows: Option<Windows>,
     /// Light of many orders; none for single scattering.
     orders: Option<OrderTable>,
     /// For an eye within the air, and where air is shown for one above it.
@@ -318,8 +326,27 @@ impl Clouds {
         if quality.second_tile {
             texels.push(quality.texels);
         }
-        // What shows nothing has no tile worth its name.
-        let (texels, levels) = if options.deck.is_empty() {
+        let windowed = options.deck.is_windowed() && !options.deck.is_empty();
+        if windowed && options.shadows {
+            return Err(fault(
+                "options.shadows",
+                true,
+                "false for a layer of more than 4 doublings of the period: a host has no program that reads windows",
+            ));
+        }
+        let windows = if windowed {
+            Some(Windows::new(
+                device,
+                programs,
+                &options.deck,
+                &quality,
+                options.far,
+            )?)
+        } else {
+            None
+        };
+        // What shows nothing has no tile worth its name, nor what has windows.
+        let (texels, levels) = if options.deck.is_empty() || windowed {
             (vec![64, 64], 2)
         } else {
             (texels, quality.levels)
@@ -334,12 +361,25 @@ impl Clouds {
         )?;
         let all = options.orders == Orders::All;
         let orders = if all && !options.deck.is_empty() {
-            let table = OrderTable::new(device, programs, &options.deck, &tile, quality.cells)?;
+            let source = match &windows {
+                Some(windows) => windows.lit_source(),
+                None => Source {
+                    views: &tile.views,
+                    sampler: &tile.sampler,
+                    levels: tile.levels,
+                    least: tile.least,
+                    window: None,
+                },
+            };
+            let table = OrderTable::new(device, programs, &options.deck, &source, quality.cells)?;
             Some(table)
         } else {
             None
         };
         let mut features = Vec::new();
+        if windowed {
+            features.push("CLOUD_WINDOW");
+        }
         if options.over_depth {
             features.push("CLOUD_OVER_DEPTH");
         }
@@ -444,6 +484,7 @@ impl Clouds {
             entries: &[
                 Some((0, &view)),
                 orders.as_ref().map(|table| (1, &table.weights)),
+                windows.as_ref().map(|windows| (2, &windows.uniform)),
             ]
             .into_iter()
             .flatten()
@@ -478,6 +519,7 @@ impl Clouds {
             far: options.far,
             depth: targets.depth,
             tile,
+            windows,
             orders,
             pipelines,
             outside: false,
@@ -506,15 +548,17 @@ impl Clouds {
     }
 
     fn bind(&mut self, device: &wgpu::Device) {
-        self.groups = self
-            .tile
-            .views
+        let (views, sampler) = match &self.windows {
+            Some(windows) => (std::slice::from_ref(&windows.view), &windows.sampler),
+            None => (&self.tile.views[..], &self.tile.sampler),
+        };
+        self.groups = views
             .iter()
             .map(|view| {
                 let mut entries = vec![
                     wgpu::BindGroupEntry {
                         binding: 0,
-                        resource: wgpu::BindingResource::Sampler(&self.tile.sampler),
+                        resource: wgpu::BindingResource::Sampler(sampler),
                     },
                     wgpu::BindGroupEntry {
                         binding: 1,
@@ -532,6 +576,12 @@ impl Clouds {
                         binding: 3,
                         resource: wgpu::BindingResource::TextureView(&table.view),
                     });
+                    if let Some(mean) = table.mean_view() {
+                        entries.push(wgpu::BindGroupEntry {
+                            binding: 5,
+                            resource: wgpu::BindingResource::TextureView(mean),
+                        });
+                    }
                 }
                 device.create_bind_group(&wgpu::BindGroupDescriptor {
                     label: Some("veduta clouds"),
@@ -663,8 +713,11 @@ impl Clouds {
     }
 
     /// What hosts need to shade their own things, for the eye of the last [`Clouds::prepare`]; none before the first, for a layer without clouds, whose shadow is 1 everywhere, and without
-    /// [`CloudsOptions::shadows`] for a view that cannot show the layer. Straight light alone: what the clouds scatter down is not in it.
+    /// [`CloudsOptions::shadows`] for a view that cannot show the layer; none for a layer with windows ([`CloudDeck::is_windowed`]). Straight light alone: what the clouds scatter down is not in it.
     pub fn shadow(&self) -> Option<CloudShadow<'_>> {
+        if self.windows.is_some() {
+            return None;
+        }
         let (shown, _) = self.shown.filter(|_| self.seen || self.shadows)?;
         Some(CloudShadow {
             tile: &self.tile.views[shown],
@@ -680,7 +733,9 @@ impl Clouds {
 
     /// What it keeps on the device.
     pub fn resources(&self) -> Resources {
-        let parts = self.tile.slots();
+        let windows = self.windows.as_ref();
+        let parts = self.tile.slots() + windows.map_or(0, Windows::bind_groups);
+        let own = u32::from(windows.is_some());
         let tiles = self.groups.len() as u32;
         let orders = self.orders.as_ref().map(OrderTable::holds);
         let (textures, bytes, buffers, groups) = orders.unwrap_or_default();
@@ -693,21 +748,28 @@ impl Clouds {
             8 * u64::from(view.texture().width()) * u64::from(view.texture().height())
         });
         Resources {
-            pipelines: 1 + self.pipelines.len() as u32 + 5 * more + laid,
+            pipelines: 1 + self.pipelines.len() as u32 + 5 * more + laid + own,
             bind_groups: parts + 2 + tiles + groups + air + laid + held,
             bindings: parts
                 + 2
+                + own
                 + more
                 + (2 + more + u32::from(self.over_depth)) * tiles
                 + 2 * groups
                 + 5 * air
                 + laid
                 + held * (1 + u32::from(self.over_depth)),
-            buffers: parts + 2 + buffers,
-            buffer_bytes: self.tile.buffer_bytes() + DrawBlock::SIZE as u64 + bytes,
-            textures: self.tile.views.len() as u32 + more + held,
-            texture_bytes: self.tile.texture_bytes() + textures + coarse_bytes,
-            samplers: 1,
+            buffers: self.tile.slots() + 2 + 3 * own + buffers,
+            buffer_bytes: self.tile.buffer_bytes()
+                + windows.map_or(0, Windows::buffer_bytes)
+                + DrawBlock::SIZE as u64
+                + bytes,
+            textures: self.tile.views.len() as u32 + own + more + held,
+            texture_bytes: self.tile.texture_bytes()
+                + windows.map_or(0, Windows::texture_bytes)
+                + textures
+                + coarse_bytes,
+            samplers: 1 + own,
         }
     }
 
@@ -750,14 +812,31 @@ impl Clouds {
         }
         let to_sun = view.sun.to_light.normalize_or(Vec3::Y);
         let before = self.shown;
-        if lights.sun.max_element() > 0.0 || self.shown.is_none() {
+        let deck = &self.deck;
+        if let Some(windows) = &mut self.windows {
+            let drift = glam::DVec3::new(deck.wind[0], 0.0, deck.wind[1]) * view.time;
+            let moved = view.eye.moved_by(-drift);
+            // At night they follow the eye alone.
+            let day = lights.sun.max_element() > 0.0 || self.shown.is_none();
+            let sun = day.then_some(to_sun);
+            self.fresh = windows.advance(queue, encoder, deck, moved, sun, &mut work);
+            self.shown = windows.sun().map(|sun| (0, sun));
+        } else if lights.sun.max_element() > 0.0 || self.shown.is_none() {
             self.bake(queue, encoder, to_sun, &mut work);
         } else {
             // At night no tile is needed for where the sun goes.
             (self.last_sun, self.fresh) = (None, false);
         }
-        if let (Some(table), Some((shown, sun))) = (&mut self.orders, self.shown) {
-            let fresh = self.fresh;
+        if let (Some(table), Some((shown, mut sun))) = (&mut self.orders, self.shown) {
+            let mut fresh = self.fresh;
+            if let Some(windows) = &mut self.windows {
+                let lit = windows.lit(self.quality.cells[0]);
+                (fresh, sun) = (lit.fresh, lit.sun);
+                table.set_slot(lit.slot);
+                if lit.moved {
+                    table.renew();
+                }
+            }
             let swapped = before.is_some_and(|b| b.0 != shown);
             let baked = (shown, sun.to_array());
             table.advance(queue, encoder, baked, fresh, swapped, &mut work);
@@ -788,7 +867,10 @@ impl Clouds {
             ray_right: right.to_array(),
             ground_radius: deck.planet_radius as f32,
             ray_up: up.to_array(),
-            far: self.far as f32,
+            far: match &self.windows {
+                Some(windows) => self.far.min(windows.reach(deck)),
+                None => self.far,
+            } as f32,
             forward: view
                 .world_from_view
                 .transform_vector3(Vec3::NEG_Z)

@@ -13,11 +13,11 @@ use veduta::reference::planet;
 use veduta::view::direction;
 use veduta::{Preset, Settings, Targets, View, WorldPos, wgpu};
 
-const RADIUS: f64 = 6.36e6;
+pub(crate) const RADIUS: f64 = 6.36e6;
 const WIDTH: u32 = 64;
 const HEIGHT: u32 = 36;
 
-fn targets() -> Targets {
+pub(crate) fn targets() -> Targets {
     Targets {
         color_format: wgpu::TextureFormat::Rgba16Float,
         ..Default::default()
@@ -36,7 +36,7 @@ fn half(low: u8, high: u8) -> f32 {
 }
 
 /// The layer over black: light and transmittance of each pixel.
-fn over_black(clouds: &mut Clouds, view: &View, lights: &CloudLights) -> Vec<[f32; 4]> {
+pub(crate) fn over_black(clouds: &mut Clouds, view: &View, lights: &CloudLights) -> Vec<[f32; 4]> {
     let gpu = gpu();
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: None,
@@ -82,14 +82,14 @@ fn over_black(clouds: &mut Clouds, view: &View, lights: &CloudLights) -> Vec<[f3
 }
 
 /// What lies between the eye and a distance: the clouds' light from there, and how much of the light from behind is left after it.
-struct Stretch {
-    distance: f64,
-    light: f64,
-    taken: f64,
+pub(crate) struct Stretch {
+    pub distance: f64,
+    pub light: f64,
+    pub taken: f64,
 }
 
 /// A march in `f64` through a layer above the point at `place`, in stretches.
-fn stretches(
+pub(crate) fn stretches(
     deck: &CloudDeck,
     place: [f64; 2],
     ray: &ProbeRay,

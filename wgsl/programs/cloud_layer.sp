@@ -73,10 +73,20 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
     #CODE{
 #ifndef CLOUD_UPSAMPLE
 #import veduta::post::dither::{blue_mask}
+#ifdef CLOUD_WINDOW
+#ifdef CLOUD_ORDERS
+#import veduta::clouds::window::{CloudWindows, march_windows_orders}
+#else
+#import veduta::clouds::window::{CloudWindows, march_windows}
+#endif
+#else
 #ifdef CLOUD_ORDERS
 #import veduta::clouds::tile::{CloudTile, march_tile_orders}
 #else
 #import veduta::clouds::tile::{CloudTile, march_tile}
+#endif
+#endif
+#ifndef CLOUD_ORDERS
 #import veduta::lighting::phase::{phase_double_henyey_greenstein}
 #endif
 #import veduta::planet::shell::{ground_distance}
@@ -137,9 +147,17 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
 }
 #else
 @group(1) @binding(0) var linear: sampler;
+// The tile, or the stack of windows.
 @group(1) @binding(1) var tile: texture_3d<f32>;
+#ifdef CLOUD_WINDOW
+@group(0) @binding(2) var<uniform> windows: CloudWindows;
+#endif
 #ifdef CLOUD_ORDERS
 @group(1) @binding(3) var cells: texture_3d<f32>;
+#ifdef CLOUD_WINDOW
+// Their mean over the land.
+@group(1) @binding(5) var mean_cells: texture_3d<f32>;
+#endif
 
 // What the two parts of the sun's own light are weighed by at 128 angles between view and sun, whose roots are even; two to a vector.
 struct CloudWeights {
@@ -200,11 +218,17 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     let reached = linear_depth / max(dot(dir, draw_view.forward), 1e-4);
     far = select(min(far, max(reached, 0.0)), far, depth == draw_view.sky_depth || reached > 1e8);
 #endif
+#ifndef CLOUD_WINDOW
     let layer = CloudTile(draw_view.place, draw_view.shear, draw_view.tiles_per_metre, draw_view.bottom, draw_view.thickness, draw_view.levels, draw_view.extinction, draw_view.clear, draw_view.least);
+#endif
     let nu = clamp(dot(dir, draw_view.to_sun), -1.0, 1.0);
     let start = select(0.0, fract(blue_mask(vec2<u32>(in.position.xy)) + draw_view.start), CLOUD_MASK != 0);
 #ifdef CLOUD_ORDERS
+#ifdef CLOUD_WINDOW
+    let light = march_windows_orders(tile, cells, mean_cells, linear, windows, draw_view.kept, nu, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS, start);
+#else
     let light = march_tile_orders(tile, cells, linear, layer, draw_view.kept, nu, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS, start);
+#endif
     let x = clamp(sqrt(acos(nu) * 0.31830989), 0.0, 1.0) * 127.0;
     let i = min(i32(x), 126);
     let weight = mix(weight_at(i), weight_at(i + 1), x - f32(i));
@@ -214,7 +238,11 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     let around = draw_view.above * light.before.y + draw_view.below * light.before.z + behind;
     return laid(dir, sun * draw_view.sun_light + around, light.transmittance, light.mean_distance);
 #else
+#ifdef CLOUD_WINDOW
+    let light = march_windows(tile, linear, windows, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS, start);
+#else
     let light = march_tile(tile, linear, layer, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS, start);
+#endif
     let phase = phase_double_henyey_greenstein(nu, draw_view.g_forward, draw_view.g_backward, draw_view.backward_share);
     return laid(dir, light.scatter * phase * draw_view.sun_light + (1.0 - light.transmittance) * draw_view.above, light.transmittance, light.mean_distance);
 #endif

@@ -13,7 +13,11 @@ orders a table of depth and angle holds.
 #import veduta::clouds::integral::{mean_density, step_light}
 #import veduta::lighting::phase::{phase_henyey_greenstein}
 #ifdef CLOUD_LAYERED
+#ifdef CLOUD_WINDOW
+#import veduta::clouds::code::{tile_value}
+#else
 #import veduta::clouds::tile::{CloudTile, tile_at}
+#endif
 #import veduta::planet::shell::{shell_segment, clip_segment, segment_length, segment_distance, altitude_along, ground_distance, direction_cosine_along}
 #endif
 #ifdef CLOUD_PUBLISH
@@ -69,6 +73,9 @@ struct CloudGrid {
     least: f32,
     // How far a texel goes to what it is to be.
     ease: f32,
+    // Of a stack of windows: which of its places is read, and how many it has.
+    slot: f32,
+    slots: f32,
 }
 
 @group(0) @binding(0) var<uniform> grid: CloudGrid;
@@ -83,10 +90,20 @@ fn cell_index(at: vec3<i32>, n: vec3<i32>) -> i32 {
     return (k.z * n.y + k.y) * n.x + k.x;
 }
 
+#ifdef CLOUD_WINDOW
+// Columns follow the sun's rays about the middle of the layer.
+fn sampled(relative: vec2<f32>, altitude: f32) -> vec2<f32> {
+    let above = clamp(altitude - grid.bottom, 0.0, grid.thickness);
+    let place = (relative - grid.shear * (above - 0.5 * grid.thickness)) / grid.size;
+    let level = (grid.slot * grid.levels + above / max(grid.thickness, 1e-3) * (grid.levels - 1.0) + 0.5) / (grid.levels * grid.slots);
+    return tile_value(textureSampleLevel(tile, linear, vec3<f32>(place, level), 0.0).xy, grid.least);
+}
+#else
 fn sampled(relative: vec2<f32>, altitude: f32) -> vec2<f32> {
     let layer = CloudTile(vec2<f32>(0.0), grid.shear, 1.0 / grid.size, grid.bottom, grid.thickness, grid.levels, grid.extinction, 0.0, grid.least);
     return tile_at(tile, linear, layer, relative, altitude);
 }
+#endif
 #else
 fn cell_index(at: vec3<i32>, n: vec3<i32>) -> i32 {
     let k = clamp(at, vec3<i32>(0), n - 1);
@@ -465,6 +482,31 @@ fn eased(held: vec2<u32>, found: vec4<f32>) -> vec2<u32> {
     return vec2<u32>(half_word(now.xy), half_word(now.zw));
 }
 
+#ifdef CLOUD_WINDOW
+// The mean of a level, of cells by what is in them; a level a row of 256 bytes.
+@compute @workgroup_size(64)
+fn average(@builtin(global_invocation_id) id: vec3<u32>) {
+    let n = grid.cells;
+    let level = i32(id.x);
+    if level >= n.y {
+        return;
+    }
+    var sum = vec4<f32>(0.0);
+    var total = 0.0;
+    for (var k = 0; k < n.x * n.z; k++) {
+        let i = ((k / n.x) * n.y + level) * n.x + k % n.x;
+        let found = moments[4 * i];
+        let along = -0.48860251 * dot(found.wyz, grid.to_sun);
+        let even = 0.28209479 * vec3<f32>(found.x, from_above[4 * i].x, from_below[4 * i].x);
+        // Of a level without clouds the plain mean.
+        let weight = cells[i].x + 1e-9;
+        sum += weight * vec4<f32>(even.x, along, even.yz);
+        total += weight;
+    }
+    let mean = sum / total;
+    texels[32 * level] = eased(texels[32 * level], mean);
+}
+#else
 // A texel a cell: what it scatters of the sun's light evenly, and for each unit of the cosine between view and sun; of the light from above, and from below.
 @compute @workgroup_size(64)
 fn publish(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -479,6 +521,7 @@ fn publish(@builtin(global_invocation_id) id: vec3<u32>) {
     let at = vec3<i32>(i % n.x, (i / n.x) % n.y, i / (n.x * n.y));
     texels[(at.y * n.z + at.z) * n.x + at.x] = eased(texels[(at.y * n.z + at.z) * n.x + at.x], vec4<f32>(even.x, along, even.yz));
 }
+#endif
 #else
 #ifdef CLOUD_LAYERED
 @compute @workgroup_size(64)

@@ -16,7 +16,7 @@ use crate::metrics::Picture;
 use crate::render::picture;
 
 /// Counts of the loop along the ray and towards the sun that stand for the converged picture.
-const CONVERGED: (i64, i64) = (512, 32);
+pub(super) const CONVERGED: (i64, i64) = (512, 32);
 
 /// Counts of the loop that are compared.
 const LOOPS: [(i64, i64); 5] = [(64, 12), (128, 12), (128, 24), (192, 24), (256, 24)];
@@ -98,16 +98,25 @@ fn spent(what: impl FnOnce() -> Result<(), CliError>) -> Result<f64, CliError> {
 }
 
 /// Where clouds are drawn: light, and transmittance in alpha.
-struct Canvas<'a> {
-    bench: &'a Bench,
-    texture: wgpu::Texture,
+pub(super) struct Canvas<'a> {
+    pub bench: &'a Bench,
+    pub texture: wgpu::Texture,
     /// The picture without clouds.
-    bare: &'a Picture,
+    pub bare: &'a Picture,
 }
 
 impl Canvas<'_> {
     /// A frame; milliseconds.
     fn draw(&self, clouds: &mut Clouds, view: &View) -> Result<f64, CliError> {
+        Ok(self.draw_and_count(clouds, view)?.0)
+    }
+
+    /// A frame; milliseconds, and what it has baked.
+    pub fn draw_and_count(
+        &self,
+        clouds: &mut Clouds,
+        view: &View,
+    ) -> Result<(f64, u32), CliError> {
         let gpu = &self.bench.gpu;
         let lights = CloudLights {
             sun: view.sun.irradiance,
@@ -115,9 +124,12 @@ impl Canvas<'_> {
             below: Vec3::ZERO,
         };
         let target = self.texture.create_view(&Default::default());
-        spent(|| {
+        let mut bakes = 0;
+        let time = spent(|| {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            let _ = clouds.prepare(&gpu.queue, &mut encoder, view, &lights)?;
+            bakes = clouds
+                .prepare(&gpu.queue, &mut encoder, view, &lights)?
+                .bakes;
             let _ = clouds.encode_volumes(&mut encoder)?;
             {
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -139,11 +151,12 @@ impl Canvas<'_> {
                 .poll(wgpu::PollType::wait_indefinitely())
                 .map_err(|e| veduta::Error::Device(e.to_string()))?;
             Ok(())
-        })
+        })?;
+        Ok((time, bakes))
     }
 
     /// What was drawn, over the picture without clouds.
-    fn picture(&self) -> Result<Picture, CliError> {
+    pub fn picture(&self) -> Result<Picture, CliError> {
         let bytes = self.bench.gpu.read_texture(&self.texture)?;
         let number = |b: &[u8]| half(u16::from_le_bytes([b[0], b[1]]));
         let rgb = bytes
@@ -394,7 +407,7 @@ pub fn run(
 }
 
 /// Time of the system at a PSNR: between the cheapest points on both sides of it, by the logarithm of the time; none above its best.
-fn time_at(points: &[Point], psnr: f64) -> Option<f64> {
+pub(super) fn time_at(points: &[Point], psnr: f64) -> Option<f64> {
     let mut best: Vec<&Point> = points.iter().collect();
     best.sort_by(|a, b| a.time.total_cmp(&b.time));
     let mut reached = f64::NEG_INFINITY;

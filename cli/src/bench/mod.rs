@@ -2,6 +2,7 @@
 
 pub mod baseline;
 pub mod chapter6;
+pub mod cloud_flight;
 pub mod clouds;
 pub mod frames;
 pub mod ground;

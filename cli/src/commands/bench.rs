@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 use crate::bench::knob::{self, Effect, Knob};
 use crate::bench::timing::{Clock, Rounds};
 use crate::bench::{
-    Bench, baseline, chapter6, clouds, frames, ground, noise, presets, sky, terrain, write_text,
+    Bench, baseline, chapter6, cloud_flight, clouds, frames, ground, noise, presets, sky, terrain, write_text,
 };
 use crate::catalog::{Catalog, SourceArgs};
 use crate::commands::render::{RenderArgs, read_json, write_json};
@@ -34,6 +34,8 @@ pub enum Subject {
     Terrain,
     /// A layer of clouds at equal error, beside the loop of `thesis`.
     Clouds,
+    /// A layer that does not repeat, for an eye that flies.
+    CloudFlight,
     /// Whole frames of sky, terrain and clouds, beside `thesis`.
     Frames,
     /// A step of the living ground.
@@ -177,6 +179,7 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 | Subject::Sky
                 | Subject::Terrain
                 | Subject::Clouds
+                | Subject::CloudFlight
                 | Subject::Frames
                 | Subject::Ground,
             ),
@@ -203,8 +206,9 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 Subject::Knob,
                 Subject::Terrain,
                 Subject::Clouds,
+                Subject::CloudFlight,
                 Subject::Frames,
-            ]) || (matches!(subject, Subject::Knob | Subject::Clouds) && args.views.len() > 1),
+            ]) || (matches!(subject, Subject::Knob | Subject::Clouds | Subject::CloudFlight) && args.views.len() > 1),
             "left out, or the subject `presets`, `terrain` or `frames`, or one view of a knob or of clouds",
         ),
         (
@@ -396,6 +400,20 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 write_json(
                     &path.with_extension("json"),
                     &clouds::to_json(&bench, &report, &command),
+                )?;
+            }
+        }
+        Subject::CloudFlight => {
+            let view = args.views.first().map_or("V01", String::as_str);
+            let report = cloud_flight::run(&bench, view, &mut progress)?;
+            bar.finish_and_clear();
+            let text = cloud_flight::markdown(&bench, &report, &command);
+            print!("{text}");
+            if let Some(path) = &args.out {
+                write_text(path, &text)?;
+                write_json(
+                    &path.with_extension("json"),
+                    &cloud_flight::to_json(&bench, &report, &command),
                 )?;
             }
         }

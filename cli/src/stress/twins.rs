@@ -78,6 +78,22 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "a_layer_from_its_tile_meets_the_march",
     ),
     (
+        "veduta::clouds::window::window_at",
+        "windows_meet_the_march_near_and_far_from_the_origin",
+    ),
+    (
+        "veduta::clouds::window::march_windows",
+        "windows_meet_the_march_near_and_far_from_the_origin",
+    ),
+    (
+        "veduta::clouds::window::window_cells_at",
+        "light_of_all_orders_in_windows_meets_paths",
+    ),
+    (
+        "veduta::clouds::window::march_windows_orders",
+        "light_of_all_orders_in_windows_meets_paths",
+    ),
+    (
         "veduta::terrain::clipmap::baked_height",
         "valleys_see_less_of_the_sky",
     ),
