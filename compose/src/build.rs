@@ -70,7 +70,11 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
         "cloud_tile" => {
-            let kinds = [vec![], vec!["CLOUD_SHAPED"]];
+            let kinds = [
+                vec![],
+                vec!["CLOUD_SHAPED"],
+                vec!["CLOUD_SHAPED", "CLOUD_MAPPED"],
+            ];
             return [vec![], vec!["CLOUD_WIDE"]]
                 .iter()
                 .flat_map(|bits| kinds.iter().map(move |kind| [&kind[..], bits].concat()))
@@ -94,6 +98,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 BTreeSet::from(["CLOUD_TILE".to_owned()]),
                 BTreeSet::from(["CLOUD_SHADOW".to_owned()]),
                 BTreeSet::from(["CLOUD_SHAPED".to_owned()]),
+                BTreeSet::from(["CLOUD_MAPPED".to_owned(), "CLOUD_SHAPED".to_owned()]),
             ];
         }
         "cloud_layer" => {

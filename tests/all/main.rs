@@ -40,4 +40,5 @@ mod terrain;
 mod tone_map;
 mod validators;
 mod warp;
+mod weather;
 mod worley;

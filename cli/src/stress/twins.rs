@@ -78,6 +78,14 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "a_layer_from_its_tile_meets_the_march",
     ),
     (
+        "veduta::clouds::shape::map_weather",
+        "clouds_under_a_weather_map_meet_the_reference",
+    ),
+    (
+        "veduta::clouds::shape::mapped_density",
+        "clouds_under_a_weather_map_meet_the_reference",
+    ),
+    (
         "veduta::terrain::clipmap::baked_height",
         "valleys_see_less_of_the_sky",
     ),
