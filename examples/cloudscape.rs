@@ -28,7 +28,7 @@ pub struct Shot {
 
 fn deck(name: &str) -> Fallible<CloudDeck> {
     Ok(if name.ends_with(".ron") {
-        CloudDeck::from_ron(&std::fs::read_to_string(name)?)?
+        CloudDeck::read(name.as_ref())?
     } else {
         CloudDeck::named(name)?
     })

@@ -53,6 +53,14 @@ pub enum Error {
         /// What is wrong with it.
         what: String,
     },
+    /// A file that holds no weather map.
+    #[error("the weather map {file}: {what}")]
+    WeatherMap {
+        /// The file.
+        file: String,
+        /// What is wrong with it.
+        what: String,
+    },
     /// No preset has this name.
     #[error("no preset is called `{name}`; the set holds {}", list(.known))]
     UnknownPreset {

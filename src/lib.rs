@@ -16,6 +16,8 @@ pub mod eval;
 mod exchange;
 pub mod ground;
 pub mod landscape;
+#[cfg(feature = "height_maps")]
+mod map_file;
 pub mod program;
 #[cfg(feature = "reference")]
 pub mod reference;

@@ -70,7 +70,10 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             return vec![BTreeSet::new(), BTreeSet::from(["TERRAIN_FAST".to_owned()])];
         }
         "cloud_tile" | "cloud_window" => {
-            let kinds = [vec![], vec!["CLOUD_SHAPED"]];
+            let mut kinds = vec![vec![], vec!["CLOUD_SHAPED"]];
+            if program == "cloud_tile" {
+                kinds.push(vec!["CLOUD_SHAPED", "CLOUD_MAPPED"]);
+            }
             return [vec![], vec!["CLOUD_WIDE"]]
                 .iter()
                 .flat_map(|bits| kinds.iter().map(move |kind| [&kind[..], bits].concat()))
@@ -94,6 +97,7 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 BTreeSet::from(["CLOUD_TILE".to_owned()]),
                 BTreeSet::from(["CLOUD_SHADOW".to_owned()]),
                 BTreeSet::from(["CLOUD_SHAPED".to_owned()]),
+                BTreeSet::from(["CLOUD_MAPPED".to_owned(), "CLOUD_SHAPED".to_owned()]),
             ];
         }
         "cloud_layer" => {

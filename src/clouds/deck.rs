@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::fault;
+use super::{WeatherMap, fault};
 use crate::error::Error;
 
 /// What forms the clouds of a layer: weather over the land, a profile over the height that goes from stratus to cumulonimbus, heaps of billows, and finer ones that fray
@@ -22,6 +22,8 @@ pub struct CloudShape {
     pub detail: f64,
     /// Density over what the noise exceeds its threshold by, in [1, 32]: soft to hard edges.
     pub sharpness: f64,
+    /// A map that tells the weather, in the place of noise: then `kind_spread` and `coverage_spread` must be 0.
+    pub map: Option<WeatherMap>,
 }
 
 impl Default for CloudShape {
@@ -34,6 +36,7 @@ impl Default for CloudShape {
             weather_doublings: 2,
             detail: 0.5,
             sharpness: 5.0,
+            map: None,
         }
     }
 }
@@ -162,6 +165,21 @@ impl CloudDeck {
                 }
             }
         }
+        if let Some((shape, map)) = self.mapped() {
+            for (name, value) in [
+                ("kind_spread", shape.kind_spread),
+                ("coverage_spread", shape.coverage_spread),
+            ] {
+                if value != 0.0 {
+                    return Err(fault(
+                        &format!("deck.shape.{name}"),
+                        value,
+                        "0 where a map tells the weather",
+                    ));
+                }
+            }
+            map.check(self.period())?;
+        }
         if self.period() > 1e9 {
             return Err(fault(
                 "deck.wavelength with deck.period_doublings",
@@ -191,9 +209,17 @@ impl CloudDeck {
         (sine as f32).clamp(super::LOWEST_SUN, 0.99)
     }
 
+    /// Forms whose weather a map tells.
+    pub(crate) fn mapped(&self) -> Option<(&CloudShape, &WeatherMap)> {
+        let shape = self.shape.as_ref()?;
+        Some((shape, shape.map.as_ref()?))
+    }
+
     /// Flags of the programs that have its noise.
     pub(super) fn flags(&self) -> &'static [&'static str] {
-        if self.shape.is_some() {
+        if self.mapped().is_some() {
+            &["CLOUD_SHAPED", "CLOUD_MAPPED"]
+        } else if self.shape.is_some() {
             &["CLOUD_SHAPED"]
         } else {
             &[]
@@ -201,11 +227,19 @@ impl CloudDeck {
     }
 
     /// Way without clouds for each unit that the density before its cut is below 0 (m): the noise seldom rises by more than its whole range over three
-    /// quarters of a wavelength of the first octave (measured in V01: within 0.3 dB of half as far). Clouds with forms rise by their steepest slopes, which those of a kind's profile at its base are not.
+    /// quarters of a wavelength of the first octave (measured in V01: within 0.3 dB of half as far). Clouds with forms rise by their steepest slopes, which those of a kind's profile at its base are not; and by those of a
+    /// map for the weather.
     pub(super) fn clear_way(&self) -> f64 {
+        let map = self.mapped();
+        self.clear_way_under(map.map_or([0.0; 2], |(_, m)| m.slopes(self.period())))
+    }
+
+    /// The same for a map whose coverage and kind rise at most by so much (1/m).
+    pub(super) fn clear_way_under(&self, [cover, kind]: [f64; 2]) -> f64 {
         if let Some(shape) = &self.shape {
             let filled = 1.0 - self.uniformity;
             let along = (2.4 * filled + 5.0 * shape.detail) / self.wavelength;
+            let along = along + self.coverage * (cover + 2.0 * shape.kind * kind);
             let slope = along + 8.0 / self.thickness.max(1.0);
             return 1.0 / (shape.sharpness * slope);
         }
@@ -253,6 +287,20 @@ impl CloudDeck {
         let deck: CloudDeck =
             ron::from_str(text).map_err(|fault| Error::Ron(format!("no clouds: {fault}")))?;
         deck.check()?;
+        Ok(deck)
+    }
+
+    /// Reads a layer's file, and that of its weather map, which is looked for beside it.
+    ///
+    /// # Errors
+    /// [`Error::Ron`] for a file that cannot be read, and as [`CloudDeck::from_ron`]; as [`WeatherMap::read`].
+    pub fn read(path: &std::path::Path) -> Result<CloudDeck, Error> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Error::Ron(format!("no clouds: {}: {e}", path.display())))?;
+        let mut deck = CloudDeck::from_ron(&text)?;
+        if let Some(map) = deck.shape.as_mut().and_then(|s| s.map.as_mut()) {
+            map.read(path.parent().unwrap_or(std::path::Path::new("")))?;
+        }
         Ok(deck)
     }
 }

@@ -193,6 +193,8 @@ struct Query<'a> {
     pipeline: wgpu::ComputePipeline,
     layouts: Vec<wgpu::BindGroupLayout>,
     tile: Option<Tile>,
+    /// A map of the weather for the march.
+    weather: Option<wgpu::TextureView>,
 }
 
 impl<'a> Query<'a> {
@@ -212,7 +214,17 @@ impl<'a> Query<'a> {
             Kind::March => None,
             _ => Some(Tile::new(&gpu.device, programs, deck, &[512], 64, true)?),
         };
+        let weather = match deck.mapped().filter(|_| kind == Kind::March) {
+            Some((_, map)) => {
+                let texels = map.known()?;
+                let texture = texels.texture(&gpu.device);
+                texels.upload(&gpu.queue, &texture);
+                Some(texture.create_view(&Default::default()))
+            }
+            None => None,
+        };
         Ok(Query {
+            weather,
             gpu,
             deck,
             pipeline,
@@ -257,6 +269,8 @@ impl<'a> Query<'a> {
                 sharpness: shape.sharpness as f32,
                 weather_doublings: shape.weather_doublings,
                 least: 1.0,
+                repeats: shape.map.as_ref().map_or(1, |m| m.repeats(deck.period())),
+                ..Default::default()
             };
             let uniform = device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("veduta layer probe"),
@@ -277,6 +291,9 @@ impl<'a> Query<'a> {
             if let Some(tile) = &self.tile {
                 read.push(entry(1, wgpu::BindingResource::Sampler(&tile.sampler)));
                 read.push(entry(2, wgpu::BindingResource::TextureView(&tile.views[0])));
+            }
+            if let Some(view) = &self.weather {
+                read.push(entry(3, wgpu::BindingResource::TextureView(view)));
             }
             let bound = [
                 vec![entry(0, uniform.as_entire_binding())],

@@ -10,6 +10,7 @@ mod phase;
 mod system;
 mod tile;
 pub mod volume;
+mod weather;
 mod window;
 
 pub use air_lights::AirLights;
@@ -17,8 +18,9 @@ pub use deck::{CloudDeck, CloudShape, back_to_front};
 pub use layer_rays::{LayerOptions, layer_light, layer_shadow};
 pub use system::{CloudLights, CloudQuality, CloudShadow, Clouds, CloudsOptions};
 pub use tile::LOWEST_SUN;
-pub use window::WindowQuality;
 pub use volume::{CubeLight, CubeOptions, CubeRay, DensityCube, cube_light};
+pub use weather::{WeatherMap, WeatherTexels};
+pub use window::WindowQuality;
 
 /// Which light of a cloud is counted and how it is found: the same as of the air.
 pub use crate::atmosphere::{Orders, ProbePath};

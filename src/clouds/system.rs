@@ -245,6 +245,8 @@ pub struct Clouds {
     fresh: bool,
     /// Fields of `CloudTile` for the last eye.
     placed: Option<[f32; 11]>,
+    /// Way in the clear (m).
+    clear: f64,
     seen: bool,
 }
 
@@ -332,6 +334,13 @@ impl Clouds {
                 "options.shadows",
                 true,
                 "false for a layer of more than 4 doublings of the period: a host has no program that reads windows",
+            ));
+        }
+        if windowed && options.deck.mapped().is_some() {
+            return Err(fault(
+                "options.deck.shape.map",
+                "a map",
+                "none for a layer of more than 4 doublings of the period",
             ));
         }
         let windows = if windowed {
@@ -514,6 +523,7 @@ impl Clouds {
             None
         };
         let mut clouds = Clouds {
+            clear: options.deck.clear_way(),
             deck: options.deck.clone(),
             quality,
             far: options.far,
@@ -712,6 +722,48 @@ impl Clouds {
         Ok(())
     }
 
+    /// Tells a host's own map of the weather, in the place of the layer's: a 2D texture of floats whose first two numbers are coverage and kind, in [0, 1] (others are cut off), over the
+    /// extent of the layer's map, which must have one to begin with. All tiles are baked anew, the first in the next frame, and so again after each call: tell a texture that has changed once more.
+    /// Where it falls from 1 to 0 from texel to texel no step in the clear passes over it, so that its marches are slower than those of a smooth map of the layer's own.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for a layer without a map, and for a texture that cannot be such a map.
+    pub fn set_weather(
+        &mut self,
+        device: &wgpu::Device,
+        view: &wgpu::TextureView,
+    ) -> Result<(), Error> {
+        let Some((_, map)) = self.deck.mapped() else {
+            let domain = "given for clouds that are told a map";
+            return Err(fault("options.deck.shape.map", "none", domain));
+        };
+        let texture = view.texture();
+        let format = texture.format();
+        let kind = format.sample_type(None, None);
+        let size = [texture.width(), texture.height()];
+        if !matches!(kind, Some(wgpu::TextureSampleType::Float { .. }))
+            || format.components() < 2
+            || texture.dimension() != wgpu::TextureDimension::D2
+            || texture.depth_or_array_layers() != 1
+            || texture.sample_count() != 1
+            || !texture
+                .usage()
+                .contains(wgpu::TextureUsages::TEXTURE_BINDING)
+            || size.iter().any(|n| *n > 4096)
+        {
+            let value = format!("{format:?}, {size:?}, {:?}", texture.usage());
+            let domain = "a 2D texture of two floats or more with TEXTURE_BINDING, at most 4096 texels a side";
+            return Err(fault("view", value, domain));
+        }
+        let texels = size[0].max(size[1]);
+        let extent = self.deck.period() / f64::from(map.repeats(self.deck.period()));
+        let steepest = f64::from(texels) / extent;
+        self.clear = self.deck.clear_way_under([steepest; 2]);
+        let _ = self.tile.set_weather(device, view);
+        (self.shown, self.coming) = (None, None);
+        Ok(())
+    }
+
     /// What hosts need to shade their own things, for the eye of the last [`Clouds::prepare`]; none before the first, for a layer without clouds, whose shadow is 1 everywhere, and without
     /// [`CloudsOptions::shadows`] for a view that cannot show the layer; none for a layer with windows ([`CloudDeck::is_windowed`]). Straight light alone: what the clouds scatter down is not in it.
     pub fn shadow(&self) -> Option<CloudShadow<'_>> {
@@ -744,12 +796,14 @@ impl Clouds {
         let coarse = self.half.as_ref().and_then(|half| half.coarse.as_ref());
         let laid = u32::from(self.half.is_some());
         let held = u32::from(coarse.is_some());
+        let (map_bytes, mapped) = self.tile.weather();
+        let (maps, mapped) = (u32::from(map_bytes > 0), u32::from(mapped));
         let coarse_bytes = coarse.map_or(0, |(view, _)| {
             8 * u64::from(view.texture().width()) * u64::from(view.texture().height())
         });
         Resources {
             pipelines: 1 + self.pipelines.len() as u32 + 5 * more + laid + own,
-            bind_groups: parts + 2 + tiles + groups + air + laid + held,
+            bind_groups: parts + 2 + tiles + groups + air + laid + held + mapped,
             bindings: parts
                 + 2
                 + own
@@ -758,17 +812,19 @@ impl Clouds {
                 + 2 * groups
                 + 5 * air
                 + laid
+                + mapped
                 + held * (1 + u32::from(self.over_depth)),
             buffers: self.tile.slots() + 2 + 3 * own + buffers,
             buffer_bytes: self.tile.buffer_bytes()
                 + windows.map_or(0, Windows::buffer_bytes)
                 + DrawBlock::SIZE as u64
                 + bytes,
-            textures: self.tile.views.len() as u32 + own + more + held,
+            textures: self.tile.views.len() as u32 + own + more + held + maps,
             texture_bytes: self.tile.texture_bytes()
                 + windows.map_or(0, Windows::texture_bytes)
                 + textures
-                + coarse_bytes,
+                + coarse_bytes
+                + map_bytes,
             samplers: 1 + own,
         }
     }
@@ -899,7 +955,7 @@ impl Clouds {
             } else {
                 0.0
             },
-            clear: deck.clear_way() as f32,
+            clear: self.clear as f32,
             least: self.tile.least,
             // The same for one projection, and as good as any for each of those that frames are shifted by.
             start: if self.quality.jitter {

@@ -1,6 +1,8 @@
 //! The tile of a layer: density and optical depth to the sun, baked in rows.
 
-use super::CloudDeck;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::{CloudDeck, WeatherTexels};
 use crate::error::Error;
 use crate::exchange::compute;
 use crate::landscape::Work;
@@ -35,6 +37,33 @@ pub(super) struct Tile {
     target: wgpu::BindGroup,
     staging: wgpu::Buffer,
     pub sampler: wgpu::Sampler,
+    weather: Option<Weather>,
+}
+
+/// A map of the weather, with what the program reads it by.
+#[derive(Debug)]
+struct Weather {
+    layout: wgpu::BindGroupLayout,
+    group: wgpu::BindGroup,
+    /// The layer's own map, none for one that a host has told, and whether the device has it.
+    own: Option<(WeatherTexels, wgpu::Texture, AtomicBool)>,
+}
+
+impl Weather {
+    fn group(
+        device: &wgpu::Device,
+        layout: &wgpu::BindGroupLayout,
+        view: &wgpu::TextureView,
+    ) -> wgpu::BindGroup {
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("veduta weather"),
+            layout,
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(view),
+            }],
+        })
+    }
 }
 
 /// Horizontal way of the sun's ray per metre of height, and its whole way.
@@ -114,7 +143,21 @@ impl Tile {
                 (uniform, bound)
             })
             .collect();
+        let weather = match deck.mapped() {
+            Some((_, map)) => {
+                let texels = map.known()?.clone();
+                let texture = texels.texture(device);
+                let view = texture.create_view(&Default::default());
+                Some(Weather {
+                    group: Weather::group(device, &layouts[1], &view),
+                    layout: layouts[1].clone(),
+                    own: Some((texels, texture, AtomicBool::new(false))),
+                })
+            }
+            None => None,
+        };
         Ok(Tile {
+            weather,
             levels,
             texel,
             least: if wide { 1.0 } else { deck.least_density() },
@@ -138,6 +181,21 @@ impl Tile {
                 ..Default::default()
             }),
         })
+    }
+
+    /// Bakes with a host's map from now on; whether the layer has its weather from a map at all.
+    pub fn set_weather(&mut self, device: &wgpu::Device, view: &wgpu::TextureView) -> bool {
+        if let Some(weather) = &mut self.weather {
+            weather.group = Weather::group(device, &weather.layout, view);
+            weather.own = None;
+        }
+        self.weather.is_some()
+    }
+
+    /// Bytes of the layer's own map, and whether there is any.
+    pub fn weather(&self) -> (u64, bool) {
+        let own = self.weather.as_ref().and_then(|w| w.own.as_ref());
+        (own.map_or(0, |(t, ..)| t.bytes()), self.weather.is_some())
     }
 
     /// Parts that a texture is baked in.
@@ -196,15 +254,33 @@ impl Tile {
             sharpness: shape.sharpness as f32,
             weather_doublings: shape.weather_doublings,
             least: self.least,
+            repeats: shape.map.map_or(1, |m| m.repeats(deck.period())),
             ..Default::default()
         };
         let (uniform, bound) = &self.slots[part as usize];
         let bytes = block.to_bytes();
         queue.write_buffer(uniform, 0, &bytes);
+        let mut work = Work {
+            dispatches: 1,
+            writes: 1,
+            bytes: bytes.len() as u64,
+            ..Work::default()
+        };
+        let own = self.weather.as_ref().and_then(|w| w.own.as_ref());
+        if let Some((map, texture, held)) = own
+            && !held.swap(true, Ordering::Relaxed)
+        {
+            map.upload(queue, texture);
+            work.writes += 1;
+            work.bytes += map.bytes();
+        }
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, bound, &[]);
+            if let Some(weather) = &self.weather {
+                pass.set_bind_group(1, &weather.group, &[]);
+            }
             pass.set_bind_group(2, &self.target, &[]);
             pass.dispatch_workgroups((texels * rows * self.texel / 4).div_ceil(64), 1, 1);
         }
@@ -231,11 +307,6 @@ impl Tile {
                 depth_or_array_layers: self.levels,
             },
         );
-        Work {
-            dispatches: 1,
-            writes: 1,
-            bytes: bytes.len() as u64,
-            ..Work::default()
-        }
+        work
     }
 }

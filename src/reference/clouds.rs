@@ -159,6 +159,13 @@ pub fn kind_profile(kind: f64, height: f64) -> f64 {
     smooth_rise(height / (0.05 + 0.05 * kind)) * (1.0 - smooth_rise((height - wane) / (end - wane)))
 }
 
+/// A place relative to the eye on the torus of a layer, in turns.
+fn torus_turns(layer: &CloudLayer, relative: [f64; 3], altitude: f64) -> [f64; 3] {
+    let period = f64::from(layer.period);
+    let cells = scale([relative[0], altitude, relative[2]], 1.0 / layer.wavelength);
+    std::array::from_fn(|k| (f64::from(layer.cell[k]) + layer.frac[k] + cells[k]) / period)
+}
+
 /// Density before its cut of a layer with forms.
 pub fn shaped_density(
     layer: &CloudLayer,
@@ -166,25 +173,55 @@ pub fn shaped_density(
     relative: [f64; 3],
     altitude: f64,
 ) -> f64 {
-    let period = f64::from(layer.period);
-    let cells = scale([relative[0], altitude, relative[2]], 1.0 / layer.wavelength);
-    let place: [f64; 3] =
-        std::array::from_fn(|k| (f64::from(layer.cell[k]) + layer.frac[k] + cells[k]) / period);
-    let bits = layer.period.ilog2();
+    let place = torus_turns(layer, relative, altitude);
     let seed = |i: i32| octave_seed(layer.seed, i);
     let flat = |bits: u32, seed: u32| {
         let (cell, frac) = torus_place([place[0], place[2]], bits);
         gradient_noise_2d_periodic(cell, frac, [1 << bits; 2], seed)
     };
+    let wide = shape.weather_doublings;
+    let fronts = flat(wide, seed(8)) + 0.5 * flat(wide + 1, seed(9));
+    let cover = (layer.coverage + shape.coverage_spread * fronts).clamp(0.0, 1.0);
+    let kind = (shape.kind + shape.kind_spread * flat(wide, seed(10))).clamp(0.0, 1.0);
+    formed_density(layer, shape, place, altitude, cover, kind)
+}
+
+/// Coverage and kind of a map at a place in turns of it.
+pub fn map_weather(map: &crate::clouds::WeatherTexels, place: [f64; 2]) -> [f64; 2] {
+    map.at(place)
+}
+
+/// Density before its cut of a layer with forms where a map that lies `repeats` times along the period tells the weather.
+pub fn mapped_density(
+    layer: &CloudLayer,
+    shape: &CloudShape,
+    map: &crate::clouds::WeatherTexels,
+    repeats: u32,
+    relative: [f64; 3],
+    altitude: f64,
+) -> f64 {
+    let place = torus_turns(layer, relative, altitude);
+    let [cover, kind] = map_weather(map, [place[0], place[2]].map(|p| p * f64::from(repeats)));
+    let (cover, kind) = (layer.coverage * cover, shape.kind * kind);
+    formed_density(layer, shape, place, altitude, cover, kind)
+}
+
+/// Density before its cut at a place on the torus, where coverage and kind are these.
+fn formed_density(
+    layer: &CloudLayer,
+    shape: &CloudShape,
+    place: [f64; 3],
+    altitude: f64,
+    cover: f64,
+    kind: f64,
+) -> f64 {
+    let bits = layer.period.ilog2();
+    let seed = |i: i32| octave_seed(layer.seed, i);
     let swelling = |bits: u32, seed: u32| {
         let (cell, frac) = torus_place(place, bits);
         gradient_noise_3d_periodic(cell, frac, [1 << bits; 3], seed)
     };
-    let wide = shape.weather_doublings;
     let height = ((altitude - layer.bottom) / layer.thickness.max(1e-3)).clamp(0.0, 1.0);
-    let fronts = flat(wide, seed(8)) + 0.5 * flat(wide + 1, seed(9));
-    let cover = (layer.coverage + shape.coverage_spread * fronts).clamp(0.0, 1.0);
-    let kind = (shape.kind + shape.kind_spread * flat(wide, seed(10))).clamp(0.0, 1.0);
     let heap = 0.6 * billows(place, bits, seed(1))
         + 0.28 * billows(place, bits + 1, seed(2))
         + 0.12 * billows(place, bits + 2, seed(3));

@@ -495,7 +495,7 @@ pub fn cube_light(
 }
 
 /// The light of a layer alone along rays of the sky's kind, on all cores: radiance, its error (one standard error for all orders) and transmittance. Single
-/// scattering is found to about 1e-4; in clouds with forms by paths that end at it, with their standard error.
+/// scattering is found to about 1e-4; in clouds with forms by paths that end at it, with their standard error. A weather map that was not read shows nothing.
 pub fn layer_light(
     deck: &CloudDeck,
     rays: &[ProbeRay],
@@ -514,6 +514,11 @@ pub fn layer_light(
         sharpness: s.sharpness,
         weather_doublings: s.weather_doublings,
     });
+    let clear = crate::clouds::WeatherTexels::new(1, vec![[0.0; 2]]).ok();
+    let map = deck.mapped().and_then(|(_, map)| {
+        let texels = map.texels.as_ref().or(clear.as_ref())?;
+        Some((texels, map.repeats(deck.period())))
+    });
     let top = deck.bottom + deck.thickness;
     let region = Region::Shell {
         ground_radius: deck.planet_radius,
@@ -526,9 +531,13 @@ pub fn layer_light(
             let altitude = region.altitude(p).clamp(deck.bottom, top);
             let across = [p[0], 0.0, p[2]];
             match &shape {
-                Some(shape) => {
-                    super::clouds::shaped_density(&layer, shape, across, altitude).clamp(0.0, 1.0)
+                Some(shape) => match map {
+                    Some((texels, repeats)) => super::clouds::mapped_density(
+                        &layer, shape, texels, repeats, across, altitude,
+                    ),
+                    None => super::clouds::shaped_density(&layer, shape, across, altitude),
                 }
+                .clamp(0.0, 1.0),
                 None => super::clouds::cloud_density(&layer, across, altitude),
             }
         },

@@ -144,7 +144,9 @@ fn windows_meet_the_march_near_and_far_from_the_origin() {
         }
         let off = (square / power).sqrt();
         let through = (through / f64::from(pixels)).sqrt();
-        println!("at {place:?}, {pitch} up: {off:.4} of the light, {through:.4} of the transmittance, {seen} of {pixels} cloudy");
+        println!(
+            "at {place:?}, {pitch} up: {off:.4} of the light, {through:.4} of the transmittance, {seen} of {pixels} cloudy"
+        );
         assert!(seen > 15, "{seen}");
         assert!(off < most, "{off}");
         assert!(through < 0.5 * most, "{through}");
@@ -195,7 +197,10 @@ fn windows_bake_what_the_eye_uncovers() {
     println!("20 km along x: {along} strips, at most {most} a frame");
     // Strips of 4 texels of 87 to 175 m, and as many again of all wider windows.
     let finest = 20_000.0 / (4.0 * 175.0);
-    assert!(f64::from(along) > finest && f64::from(along) < 4.5 * finest, "{along}");
+    assert!(
+        f64::from(along) > finest && f64::from(along) < 4.5 * finest,
+        "{along}"
+    );
     assert!(most <= 6);
     let mut other = self::clouds(quality, endless(), Orders::Single);
     let _ = advance(&mut other, &at(0.0, 0.0, 0.0));
@@ -306,7 +311,9 @@ fn windows_follow_the_sun() {
     // A flight under a sun that moves is none but a shift of both.
     for k in 0..120 {
         let mut view = under(0.7 - 0.002 * f64::from(k));
-        view.eye = view.eye.moved_by(DVec3::new(400.0, 0.0, -250.0) * f64::from(k));
+        view.eye = view
+            .eye
+            .moved_by(DVec3::new(400.0, 0.0, -250.0) * f64::from(k));
         let _ = advance(&mut clouds, &view);
         if k % 30 == 29 {
             let (_, off) = apart(&over_black(&mut clouds, &view, &ALONE), &fresh(&view));
@@ -392,7 +399,9 @@ fn light_of_all_orders_in_windows_meets_paths() {
             }
         }
         let [square, noisy] = [square, noisy].map(|s: f64| (s / blocks).sqrt() / rms);
-        println!("{pitch} up: mean {off:+.3} (noise {noise:.3}), blocks {square:.3} (noise {noisy:.3})");
+        println!(
+            "{pitch} up: mean {off:+.3} (noise {noise:.3}), blocks {square:.3} (noise {noisy:.3})"
+        );
         assert!(off.abs() < 0.1 + 2.0 * noise, "{off} {noise}");
         assert!(
             square < (0.2_f64.powi(2) + noisy * noisy).sqrt(),
@@ -415,7 +424,9 @@ fn light_of_all_orders_in_windows_meets_paths() {
         let fresh = over_black(&mut fresh, &away, &ALONE);
         let (_, early) = apart(&flown_at_once, &fresh);
         let (_, late) = apart(&over_black(&mut clouds, &away, &ALONE), &fresh);
-        println!("flown 22 km in 40 frames {early:.4} off, at rest there after {frames} frames {late:.4}");
+        println!(
+            "flown 22 km in 40 frames {early:.4} off, at rest there after {frames} frames {late:.4}"
+        );
         assert!(late < 0.03, "{late}");
         assert!(early < 0.2, "{early}");
     }
@@ -447,10 +458,28 @@ fn what_windows_cannot_do_is_refused() {
     };
     let good = small().windows;
     for (windows, name) in [
-        (WindowQuality { texels: 100, ..good }, "windows.texels"),
-        (WindowQuality { texels: 544, ..good }, "windows.texels"),
+        (
+            WindowQuality {
+                texels: 100,
+                ..good
+            },
+            "windows.texels",
+        ),
+        (
+            WindowQuality {
+                texels: 544,
+                ..good
+            },
+            "windows.texels",
+        ),
         (WindowQuality { levels: 1, ..good }, "windows.levels"),
-        (WindowQuality { fineness: 0, ..good }, "windows.fineness"),
+        (
+            WindowQuality {
+                fineness: 0,
+                ..good
+            },
+            "windows.fineness",
+        ),
     ] {
         let text = with(windows);
         assert!(text.contains(name), "{text}");
@@ -464,7 +493,10 @@ fn what_windows_cannot_do_is_refused() {
 /// Pictures of layers with forms, of wide numbers, from within, above and far away, with the sun high and low, hold no value that is not finite.
 #[test]
 fn windows_of_every_kind_are_finite() {
-    for (k, name) in ["fair", "towers", "stratus", "thesis"].into_iter().enumerate() {
+    for (k, name) in ["fair", "towers", "stratus", "thesis"]
+        .into_iter()
+        .enumerate()
+    {
         let deck = CloudDeck {
             period_doublings: 5 + 2 * k as u32,
             ..CloudDeck::named(name).unwrap()

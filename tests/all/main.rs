@@ -41,4 +41,5 @@ mod terrain;
 mod tone_map;
 mod validators;
 mod warp;
+mod weather;
 mod worley;

@@ -95,6 +95,58 @@ fn kind_profile(kind: f32, height: f32) -> f32 {
     return smooth_rise(height / (0.05 + 0.05 * kind)) * (1.0 - smooth_rise((height - wane) / (end - wane)));
 }
 
+/// Density before its cut of a layer with forms at a place on its torus, where coverage and kind are these.
+///
+/// internal
+fn formed_density(layer: CloudLayer, shape: CloudShape, turn: vec3<u32>, altitude: f32, cover: f32, kind: f32) -> f32 {
+    let bits = layer.period_doublings;
+    let height = clamp((altitude - layer.bottom) / max(layer.thickness, 1e-3), 0.0, 1.0);
+    let heap = 0.6 * billows(turn, bits, octave_seed(layer.seed, 1)) + 0.28 * billows(turn, bits + 1u, octave_seed(layer.seed, 2))
+        + 0.12 * billows(turn, bits + 2u, octave_seed(layer.seed, 3));
+    let swell = torus_gradient_3d(turn, bits, octave_seed(layer.seed, 4)) + 0.5 * torus_gradient_3d(turn, bits + 1u, octave_seed(layer.seed, 5));
+    let base = mix(clamp(0.175 + 0.21 * swell + 0.8125 * heap, 0.0, 1.0), 1.0, layer.uniformity);
+    let whole = shape.sharpness * (base + cover * kind_profile(kind, height) - 1.0);
+    let fine = 0.65 * billows(turn, bits + 3u, octave_seed(layer.seed, 6)) + 0.35 * billows(turn, bits + 4u, octave_seed(layer.seed, 7));
+    // Wisps below, heads above.
+    let frayed = mix(fine, 1.0 - fine, clamp(8.0 * height, 0.0, 1.0));
+    return whole - 0.35 * shape.detail * shape.sharpness * frayed * (1.0 - clamp(whole, 0.0, 1.0));
+}
+
+/// Coverage and kind of a map that lies over the torus, linear between the middles of its texels.
+///
+/// domain  turn in [0, 4294967295] turn/2^32 lin
+/// range   [0, 1] 1
+/// error   2e-5 abs of reference::clouds::map_weather
+/// source  bilinear, with 16 bits of a texel
+fn map_weather(map: texture_2d<f32>, turn: vec2<u32>) -> vec2<f32> {
+    let size = textureDimensions(map);
+    // In texels, 16 bits behind the point; a map farther on, so that half a texel less is above 0.
+    let wide = (turn >> vec2<u32>(16u)) * size + (((turn & vec2<u32>(65535u)) * size) >> vec2<u32>(16u));
+    let at = wide + (size << vec2<u32>(16u)) - 32768u;
+    let cell = at >> vec2<u32>(16u);
+    let low = select(cell, cell - size, cell >= size);
+    let next = select(low + 1u, vec2<u32>(0u), low + 1u == size);
+    let part = vec2<f32>(at & vec2<u32>(65535u)) * 1.5258789e-5;
+    let north = mix(textureLoad(map, low, 0).xy, textureLoad(map, vec2<u32>(next.x, low.y), 0).xy, part.x);
+    let south = mix(textureLoad(map, vec2<u32>(low.x, next.y), 0).xy, textureLoad(map, next, 0).xy, part.x);
+    return clamp(mix(north, south, part.y), vec2<f32>(0.0), vec2<f32>(1.0));
+}
+
+/// As `shaped_density`, where a map tells the weather: its coverage times that of the layer, its kind times that of the shape. It lies `repeats` times along the period.
+///
+/// domain  repeats in [1, 4096] 1 lin
+/// domain  relative in [-1e5, 1e5] m lin
+/// domain  altitude in [4000, 5500] m lin
+/// range   [-1e2, 3.3e1] 1
+/// error   2e-3 abs of reference::clouds::mapped_density
+/// outside undefined
+/// source  Schneider2015; formulas: ours
+fn mapped_density(map: texture_2d<f32>, layer: CloudLayer, shape: CloudShape, repeats: u32, relative: vec3<f32>, altitude: f32) -> f32 {
+    let turn = layer.turn + turn_3d(vec3<f32>(relative.x, altitude, relative.z) * layer.turns_per_metre);
+    let weather = map_weather(map, turn.xz * repeats);
+    return formed_density(layer, shape, turn, altitude, layer.coverage * weather.x, shape.kind * weather.y);
+}
+
 /// Density before its cut of a layer with forms, as `uncut_density` gives that of value noise; not cut at the layer's spheres either.
 ///
 /// domain  relative in [-1e5, 1e5] m lin
@@ -105,19 +157,9 @@ fn kind_profile(kind: f32, height: f32) -> f32 {
 /// source  Schneider2015; formulas: ours
 fn shaped_density(layer: CloudLayer, shape: CloudShape, relative: vec3<f32>, altitude: f32) -> f32 {
     let turn = layer.turn + turn_3d(vec3<f32>(relative.x, altitude, relative.z) * layer.turns_per_metre);
-    let bits = layer.period_doublings;
     let wide = shape.weather_doublings;
-    let height = clamp((altitude - layer.bottom) / max(layer.thickness, 1e-3), 0.0, 1.0);
     let fronts = torus_gradient_2d(turn.xz, wide, octave_seed(layer.seed, 8)) + 0.5 * torus_gradient_2d(turn.xz, wide + 1u, octave_seed(layer.seed, 9));
     let cover = clamp(layer.coverage + shape.coverage_spread * fronts, 0.0, 1.0);
     let kind = clamp(shape.kind + shape.kind_spread * torus_gradient_2d(turn.xz, wide, octave_seed(layer.seed, 10)), 0.0, 1.0);
-    let heap = 0.6 * billows(turn, bits, octave_seed(layer.seed, 1)) + 0.28 * billows(turn, bits + 1u, octave_seed(layer.seed, 2))
-        + 0.12 * billows(turn, bits + 2u, octave_seed(layer.seed, 3));
-    let swell = torus_gradient_3d(turn, bits, octave_seed(layer.seed, 4)) + 0.5 * torus_gradient_3d(turn, bits + 1u, octave_seed(layer.seed, 5));
-    let base = mix(clamp(0.175 + 0.21 * swell + 0.8125 * heap, 0.0, 1.0), 1.0, layer.uniformity);
-    let whole = shape.sharpness * (base + cover * kind_profile(kind, height) - 1.0);
-    let fine = 0.65 * billows(turn, bits + 3u, octave_seed(layer.seed, 6)) + 0.35 * billows(turn, bits + 4u, octave_seed(layer.seed, 7));
-    // Wisps below, heads above.
-    let frayed = mix(fine, 1.0 - fine, clamp(8.0 * height, 0.0, 1.0));
-    return whole - 0.35 * shape.detail * shape.sharpness * frayed * (1.0 - clamp(whole, 0.0, 1.0));
+    return formed_density(layer, shape, turn, altitude, cover, kind);
 }

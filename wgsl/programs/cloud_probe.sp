@@ -18,7 +18,11 @@ its tile.
 #ifdef CLOUD_SHAPED
 #import veduta::clouds::field::{CloudLayer}
 #import veduta::clouds::march::{layer_exit}
+#ifdef CLOUD_MAPPED
+#import veduta::clouds::shape::{CloudShape, mapped_density}
+#else
 #import veduta::clouds::shape::{CloudShape, shaped_density}
+#endif
 #else
 #import veduta::clouds::field::{CloudLayer, cloud_density}
 #import veduta::clouds::march::{sun_depth}
@@ -54,6 +58,8 @@ struct LayerProbe {
     weather_doublings: u32,
     // The least density that the tile tells.
     least: f32,
+    // Times that a map for the weather lies along the edge.
+    repeats: u32,
 }
 
 struct LayerRay {
@@ -78,6 +84,9 @@ struct LayerLight {
 @group(1) @binding(2) var tile: texture_3d<f32>;
 #endif
 #endif
+#ifdef CLOUD_MAPPED
+@group(1) @binding(3) var weather: texture_2d<f32>;
+#endif
 @group(2) @binding(0) var<storage, read_write> results: array<LayerLight>;
 
 #ifndef CLOUD_SHADOW
@@ -85,7 +94,11 @@ struct LayerLight {
 fn density_here(layer: CloudLayer, relative: vec3<f32>, altitude: f32) -> f32 {
 #ifdef CLOUD_SHAPED
     let shape = CloudShape(probe.kind, probe.kind_spread, probe.coverage_spread, probe.detail, probe.sharpness, probe.weather_doublings);
+#ifdef CLOUD_MAPPED
+    return clamp(mapped_density(weather, layer, shape, probe.repeats, relative, altitude), 0.0, 1.0);
+#else
     return clamp(shaped_density(layer, shape, relative, altitude), 0.0, 1.0);
+#endif
 #else
     return cloud_density(layer, relative, altitude);
 #endif

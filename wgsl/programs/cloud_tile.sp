@@ -12,7 +12,11 @@ words; with CLOUD_WIDE one.
 #endif
 #ifdef CLOUD_SHAPED
 #import veduta::clouds::field::{CloudLayer}
+#ifdef CLOUD_MAPPED
+#import veduta::clouds::shape::{CloudShape, mapped_density}
+#else
 #import veduta::clouds::shape::{CloudShape, shaped_density}
+#endif
 #else
 #import veduta::clouds::field::{CloudLayer, uncut_density}
 #endif
@@ -46,9 +50,14 @@ struct TileRows {
     weather_doublings: u32,
     // The least density that is told.
     least: f32,
+    // Times that a map for the weather lies along the edge.
+    repeats: u32,
 }
 
 @group(0) @binding(0) var<uniform> tile: TileRows;
+#ifdef CLOUD_MAPPED
+@group(1) @binding(0) var weather: texture_2d<f32>;
+#endif
 @group(2) @binding(0) var<storage, read_write> texels: array<u32>;
 
 #ifdef CLOUD_WIDE
@@ -66,7 +75,11 @@ fn density_over(layer: CloudLayer, column: i32, row: i32, up: f32) -> f32 {
     let altitude = clamp(tile.bottom + up, tile.bottom, tile.bottom + tile.thickness);
 #ifdef CLOUD_SHAPED
     let shape = CloudShape(tile.kind, tile.kind_spread, tile.coverage_spread, tile.detail, tile.sharpness, tile.weather_doublings);
+#ifdef CLOUD_MAPPED
+    let found = mapped_density(weather, layer, shape, tile.repeats, vec3<f32>(at.x, 0.0, at.y), altitude);
+#else
     let found = shaped_density(layer, shape, vec3<f32>(at.x, 0.0, at.y), altitude);
+#endif
 #else
     let found = uncut_density(layer, vec3<f32>(at.x, 0.0, at.y), altitude);
 #endif

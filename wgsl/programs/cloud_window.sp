@@ -120,7 +120,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
         let right = density_over(other, up);
         depth.y += gain * mean_density(above.y, right);
         above.y = right;
-        let word = pack4x8unorm(vec4<f32>(tile_code(left, depth.x, part.least), tile_code(right, depth.y, part.least)));
+        let word = pack4x8snorm(vec4<f32>(tile_code(left, depth.x, part.least), tile_code(right, depth.y, part.least)));
 #endif
         texels[(j * part.size.y + row) * words + i] = word;
     }

@@ -354,7 +354,15 @@ fn named_or_file<T>(
 /// # Errors
 /// [`CliError::Read`], [`CliError::Table`] with the file and what is wrong in it, a name that does not exist.
 pub fn deck(name: &str) -> Result<CloudDeck, CliError> {
-    named_or_file(name, CloudDeck::named, CloudDeck::from_ron)
+    let path = Path::new(name);
+    if path.extension().is_none_or(|e| e != "ron") {
+        return Ok(CloudDeck::named(name)?);
+    }
+    std::fs::metadata(path).map_err(|e| CliError::read(path, e))?;
+    CloudDeck::read(path).map_err(|e| CliError::Table {
+        path: path.to_owned(),
+        what: e.to_string(),
+    })
 }
 
 fn layer(args: &CloudsArgs) -> Result<(), CliError> {

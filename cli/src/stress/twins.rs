@@ -94,6 +94,14 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "light_of_all_orders_in_windows_meets_paths",
     ),
     (
+        "veduta::clouds::shape::map_weather",
+        "clouds_under_a_weather_map_meet_the_reference",
+    ),
+    (
+        "veduta::clouds::shape::mapped_density",
+        "clouds_under_a_weather_map_meet_the_reference",
+    ),
+    (
         "veduta::terrain::clipmap::baked_height",
         "valleys_see_less_of_the_sky",
     ),
