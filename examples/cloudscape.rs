@@ -1,6 +1,7 @@
 //! Layers of clouds under a sky: the sky is drawn first, then the layers from back to front, each lit by the air and behind the air before it. Run it with
 //! `cargo run --release --example cloudscape -- picture.ppm fair 300 15 50 120` for the layer `fair` (several with commas between, or files), an eye at 300 m, a view 15 degrees
-//! up, and a sun at 50 degrees, 120 degrees to the right of the view. With `-- sheet.png` alone it draws the sheet of `docs/clouds`.
+//! up, and a sun at 50 degrees, 120 degrees to the right of the view; then frames that are drawn before it, width, height, and the speed that the eye flies ahead with meanwhile (m/s at 30
+//! frames a second). With `-- sheet.png` alone it draws the sheet of `docs/clouds`.
 
 use veduta::atmosphere::{Eye, Sky, SkyComposition, SkyOptions, SkyQuality, SkyTables};
 use veduta::clouds::{AirLights, CloudDeck, CloudLights, Clouds, CloudsOptions, back_to_front};
@@ -24,6 +25,8 @@ pub struct Shot {
     pub sun_azimuth: f64,
     /// Frames that are drawn before the picture, in which tiles and light come to rest.
     pub frames: u32,
+    /// Speed of the eye (m/s), at 30 frames a second.
+    pub speed: f64,
 }
 
 fn deck(name: &str) -> Fallible<CloudDeck> {
@@ -103,7 +106,10 @@ pub fn draw(size: [u32; 2], shot: &Shot) -> Fallible<Vec<u8>> {
     }
     let decks: Vec<&CloudDeck> = layers.iter().map(|(clouds, _)| clouds.deck()).collect();
     let order = back_to_front(shot.altitude, &decks)?;
-    for _ in 0..shot.frames.max(1) {
+    let start = view.eye;
+    for frame in 0..shot.frames.max(1) {
+        let flown = shot.speed * f64::from(frame) / 30.0;
+        view.eye = start.moved_by(DVec3::new(0.0, 0.0, -flown));
         let mut encoder = device.create_command_encoder(&Default::default());
         let _ = sky.prepare(queue, &mut encoder, &view)?;
         let eye = Eye {
@@ -182,6 +188,7 @@ fn sheet(path: &str) -> Fallible<()> {
             sun_height,
             sun_azimuth,
             frames: 60,
+            speed: 0.0,
         };
         let shown = finished(&draw([width as u32, height as u32], &shot)?);
         for (y, row) in shown.chunks_exact(3 * width).enumerate() {
@@ -215,6 +222,7 @@ fn main() -> Fallible<()> {
         sun_height: number(4, 50.0)?,
         sun_azimuth: number(5, 120.0)?,
         frames: number(6, 60.0)? as u32,
+        speed: number(9, 0.0)?,
     };
     let size = [number(7, 480.0)? as u32, number(8, 270.0)? as u32];
     let pixels = draw(size, &shot)?;

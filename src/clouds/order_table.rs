@@ -19,8 +19,6 @@ const FIRST_SWEEPS: [u32; KINDS] = [20, 8, 8];
 const SWEEPS: [u32; KINDS] = [24, 16, 16];
 /// Sweeps after a sun that has gone on.
 const NEXT_SWEEPS: u32 = 12;
-/// Sweeps after a window has moved.
-const MOVED_SWEEPS: [u32; KINDS] = [12, 8, 8];
 /// Bytes of a level in the buffer of means: copies want multiples of 256.
 const MEAN_ROW: u32 = 256;
 /// Frames that a sweep takes, and one more for what cells scatter of it.
@@ -393,7 +391,7 @@ impl OrderTable {
         let mut told = false;
         if self.again && self.filled >= FILLS {
             (self.filled, self.again) = (0, false);
-            for (left, sweeps) in self.left.iter_mut().zip(MOVED_SWEEPS) {
+            for (left, sweeps) in self.left.iter_mut().zip(SWEEPS) {
                 *left = sweeps.max(*left);
             }
         }

@@ -428,7 +428,8 @@ fn light_of_all_orders_in_windows_meets_paths() {
             "flown 22 km in 40 frames {early:.4} off, at rest there after {frames} frames {late:.4}"
         );
         assert!(late < 0.03, "{late}");
-        assert!(early < 0.2, "{early}");
+        // 16 km/s, before the light has followed.
+        assert!(early < 0.35, "{early}");
     }
 }
 

@@ -36,7 +36,7 @@ pub enum Subject {
     /// A layer of clouds at equal error, beside the loop of `thesis`.
     Clouds,
     /// A layer that does not repeat, for an eye that flies.
-    CloudFlight,
+    Flight,
     /// Whole frames of sky, terrain and clouds, beside `thesis`.
     Frames,
     /// A step of the living ground.
@@ -180,7 +180,7 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 | Subject::Sky
                 | Subject::Terrain
                 | Subject::Clouds
-                | Subject::CloudFlight
+                | Subject::Flight
                 | Subject::Frames
                 | Subject::Ground,
             ),
@@ -207,12 +207,10 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 Subject::Knob,
                 Subject::Terrain,
                 Subject::Clouds,
-                Subject::CloudFlight,
+                Subject::Flight,
                 Subject::Frames,
-            ]) || (matches!(
-                subject,
-                Subject::Knob | Subject::Clouds | Subject::CloudFlight
-            ) && args.views.len() > 1),
+            ]) || (matches!(subject, Subject::Knob | Subject::Clouds | Subject::Flight)
+                && args.views.len() > 1),
             "left out, or the subject `presets`, `terrain` or `frames`, or one view of a knob or of clouds",
         ),
         (
@@ -407,7 +405,7 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 )?;
             }
         }
-        Subject::CloudFlight => {
+        Subject::Flight => {
             let view = args.views.first().map_or("V01", String::as_str);
             let report = cloud_flight::run(&bench, view, &mut progress)?;
             bar.finish_and_clear();
