@@ -75,7 +75,13 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
                 vec!["CLOUD_SHAPED"],
                 vec!["CLOUD_SHAPED", "CLOUD_MAPPED"],
             ];
-            return [vec![], vec!["CLOUD_WIDE"]]
+            let bits = [
+                vec![],
+                vec!["CLOUD_WIDE"],
+                vec!["CLOUD_LOW_SUN"],
+                vec!["CLOUD_LOW_SUN", "CLOUD_WIDE"],
+            ];
+            return bits
                 .iter()
                 .flat_map(|bits| kinds.iter().map(move |kind| [&kind[..], bits].concat()))
                 .map(|flags| flags.into_iter().map(str::to_owned).collect())

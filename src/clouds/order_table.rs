@@ -388,7 +388,7 @@ impl OrderTable {
             gain,
             momentum,
             to_sun,
-            shear: slant(to_sun, self.lowest).0,
+            shear: slant(to_sun, self.lowest).shear,
             sun: amount(0),
             uniform_light: amount(1),
             below: amount(2),
