@@ -71,10 +71,13 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
         }
         "cloud_tile" | "cloud_window" => {
             let mut kinds = vec![vec![], vec!["CLOUD_SHAPED"]];
+            let mut bits = vec![vec![], vec!["CLOUD_WIDE"]];
             if program == "cloud_tile" {
                 kinds.push(vec!["CLOUD_SHAPED", "CLOUD_MAPPED"]);
+                bits.push(vec!["CLOUD_LOW_SUN"]);
+                bits.push(vec!["CLOUD_LOW_SUN", "CLOUD_WIDE"]);
             }
-            return [vec![], vec!["CLOUD_WIDE"]]
+            return bits
                 .iter()
                 .flat_map(|bits| kinds.iter().map(move |kind| [&kind[..], bits].concat()))
                 .map(|flags| flags.into_iter().map(str::to_owned).collect())

@@ -200,13 +200,23 @@ impl CloudDeck {
         self.period_doublings > 4
     }
 
-    /// Sine of the lowest height of the sun that a tile of so many levels is baked for, at least [`super::LOWEST_SUN`]: columns of the tile follow the sun's rays, which between
-    /// two levels go at most a twelfth of a wavelength across. A lower sun is taken to be that high.
+    /// Sine of the lowest height of the sun whose rays the columns of a tile of so many levels follow, at least that of 7 degrees: rays that between
+    /// two levels go at most an eighteenth of a wavelength across. For a lower sun columns stand upright; one below
+    /// [`super::LOWEST_SUN`] is taken to be that high.
     pub fn lowest_sun(&self, levels: u32) -> f32 {
+        self.lowest_across(levels, 18.0)
+    }
+
+    /// The same for the columns of windows, whose rays go at most a twelfth of a wavelength across; a lower sun is taken to be that high.
+    pub(super) fn lowest_window_sun(&self, levels: u32) -> f32 {
+        self.lowest_across(levels, 12.0)
+    }
+
+    fn lowest_across(&self, levels: u32, share: f64) -> f32 {
         let level = self.thickness / f64::from(levels.max(2) - 1);
-        let tangent = 12.0 * level / self.wavelength;
+        let tangent = share * level / self.wavelength;
         let sine = tangent / (1.0 + tangent * tangent).sqrt();
-        (sine as f32).clamp(super::LOWEST_SUN, 0.99)
+        (sine as f32).clamp(0.121_869, 0.99)
     }
 
     /// Forms whose weather a map tells.

@@ -83,7 +83,7 @@ impl<'a> LayerOrders<'a> {
         let to_sun = to_sun.map(|c| c as f32);
         GridBlock {
             to_sun,
-            shear: slant(to_sun, self.lowest).0,
+            shear: slant(to_sun, self.lowest).shear,
             sun: lighting.sun,
             uniform_light: lighting.around[0],
             below: lighting.around[1],

@@ -1,7 +1,7 @@
 //! Light of a layer of clouds alone along given rays: a query.
 
 use super::layer_orders::{LayerOrders, Lighting};
-use super::tile::{Tile, slant};
+use super::tile::{LOWEST_SUN, Tile, slant};
 use super::{CloudDeck, CubeLight, Orders, ProbePath, fault};
 use crate::atmosphere::ProbeRay;
 use crate::device::Gpu;
@@ -41,7 +41,7 @@ impl Default for LayerOptions {
 ///
 /// Light of all orders is that of a layer over a plane that repeats, without the planet's curvature, swept over cells as in [`super::cube_light`]; what light
 /// from above and from below shows of itself behind the clouds is not counted. The sun's depths are those of a sun that is at least as high as
-/// [`CloudDeck::lowest_sun`]; where it is lower, rays of single scattering are marched on both paths.
+/// [`super::LOWEST_SUN`]; where it is lower, rays of single scattering are marched on both paths.
 ///
 /// # Errors
 /// As [`CloudDeck::check`]; [`Error::OutOfDomain`] for options; the faults of making pipelines; [`Error::Device`].
@@ -115,7 +115,7 @@ pub fn layer_light(
     let (mut marched, mut baked) = (None, None);
     for (to_sun, members) in &groups {
         let sun = to_sun.map(|c| c as f32);
-        let fast = path == ProbePath::Fast && sun[1] >= deck.lowest_sun(64);
+        let fast = path == ProbePath::Fast && sun[1] >= LOWEST_SUN;
         let rows: Vec<[f32; 5]> = members
             .iter()
             .map(|i| {
@@ -144,7 +144,7 @@ pub fn layer_light(
 }
 
 /// Share of the sun's light that a layer lets straight through to points: (x, altitude, z) in metres, from the tile that `Clouds` and `cloud_shadow` read, with suns
-/// below [`CloudDeck::lowest_sun`] taken to be that high. What the clouds scatter down is not counted. Submits and waits.
+/// below [`super::LOWEST_SUN`] taken to be that high. What the clouds scatter down is not counted. Submits and waits.
 ///
 /// # Errors
 /// As [`CloudDeck::check`]; [`Error::OutOfDomain`] for points that are not finite; the faults of making pipelines; [`Error::Device`].
@@ -241,12 +241,14 @@ impl<'a> Query<'a> {
             bake(gpu, tile, deck, sun);
         }
         let mut light = Vec::with_capacity(list.len());
+        let slant = slant(sun, deck.lowest_sun(64));
         let shape = deck.shape.clone().unwrap_or_default();
         for part in list.chunks(1 << 12) {
             let block = ProbeBlock {
                 to_sun: sun,
                 ground_radius: deck.planet_radius as f32,
-                shear: slant(sun, deck.lowest_sun(64)).0,
+                shear: slant.shear,
+                sunward: slant.sunward,
                 edge: deck.period() as f32,
                 levels: 64.0,
                 bottom: deck.bottom as f32,

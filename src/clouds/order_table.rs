@@ -314,7 +314,10 @@ impl OrderTable {
         let kept = 1.0 - lobes.albedo * lobes.peak();
         Ok(OrderTable {
             even: block.degrees[0],
-            lowest: deck.lowest_sun(tile.levels),
+            lowest: match tile.window {
+                Some(_) => deck.lowest_window_sun(tile.levels),
+                None => deck.lowest_sun(tile.levels),
+            },
             pace: lobes.pace(),
             kept: kept as f32,
             weights: filled(&weights.to_bytes())?,
@@ -503,7 +506,10 @@ impl OrderTable {
             gain,
             momentum,
             to_sun,
-            shear: slant(to_sun, self.lowest).0,
+            shear: match self.mean {
+                Some(_) => super::window::slant(to_sun, self.lowest).0,
+                None => slant(to_sun, self.lowest).shear,
+            },
             sun: amount(0),
             uniform_light: amount(1),
             below: amount(2),

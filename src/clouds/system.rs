@@ -244,7 +244,7 @@ pub struct Clouds {
     /// Whether the first tile was baked in this frame.
     fresh: bool,
     /// Fields of `CloudTile` for the last eye.
-    placed: Option<[f32; 11]>,
+    placed: Option<[f32; 13]>,
     /// Way in the clear (m).
     clear: f64,
     seen: bool,
@@ -270,7 +270,7 @@ pub struct CloudShadow<'a> {
     /// Its sampler, which filters.
     pub sampler: &'a wgpu::Sampler,
     /// The fields of `CloudTile` in their order, for positions relative to the eye of the last [`Clouds::prepare`]; anew after each.
-    pub layer: [f32; 11],
+    pub layer: [f32; 13],
 }
 
 impl Clouds {
@@ -802,19 +802,19 @@ impl Clouds {
             8 * u64::from(view.texture().width()) * u64::from(view.texture().height())
         });
         Resources {
-            pipelines: 1 + self.pipelines.len() as u32 + 5 * more + laid + own,
-            bind_groups: parts + 2 + tiles + groups + air + laid + held + mapped,
+            pipelines: 2 + self.pipelines.len() as u32 + 5 * more + laid + own,
+            bind_groups: parts + 3 + tiles + groups + air + laid + held + mapped,
             bindings: parts
-                + 2
+                + 3
                 + own
                 + more
                 + (2 + more + u32::from(self.over_depth)) * tiles
                 + 2 * groups
                 + 5 * air
                 + laid
-                + mapped
+                + 2 * mapped
                 + held * (1 + u32::from(self.over_depth)),
-            buffers: self.tile.slots() + 2 + 3 * own + buffers,
+            buffers: self.tile.slots() + 3 + 3 * own + buffers,
             buffer_bytes: self.tile.buffer_bytes()
                 + windows.map_or(0, Windows::buffer_bytes)
                 + DrawBlock::SIZE as u64
@@ -917,6 +917,7 @@ impl Clouds {
                 (albedo, around, around)
             }
         };
+        let slant = slant(sun.to_array(), deck.lowest_sun(self.tile.levels));
         let block = DrawBlock {
             ray_middle: middle.to_array(),
             eye_altitude: eye.altitude() as f32,
@@ -942,7 +943,7 @@ impl Clouds {
             kept: self.orders.as_ref().map_or(1.0, |table| table.kept),
             extinction: deck.extinction as f32,
             place: [place(0)?, place(2)?],
-            shear: slant(sun.to_array(), deck.lowest_sun(self.tile.levels)).0,
+            shear: slant.shear,
             tiles_per_metre: (1.0 / period) as f32,
             bottom: deck.bottom as f32,
             thickness: deck.thickness as f32,
@@ -979,6 +980,8 @@ impl Clouds {
             block.place[1],
             block.shear[0],
             block.shear[1],
+            slant.sunward[0],
+            slant.sunward[1],
             block.tiles_per_metre,
             block.bottom,
             block.thickness,
@@ -1037,14 +1040,14 @@ impl Clouds {
                 return;
             }
             // The new tile is shown for as long as the one after it takes: it is baked for the middle of that time.
-            let share = self.share(other);
+            let share = self.share(other, to_sun);
             let taken = self.tile.parts(other).div_ceil(share);
             let ahead = to_sun + step * (1.5 * taken as f32);
             let ahead = if step.length() < 0.02 { ahead } else { to_sun };
             self.coming = Some((ahead.normalize_or(to_sun), 0));
             work.bakes += 1;
         }
-        let share = self.share(other);
+        let share = self.share(other, self.coming.map_or(to_sun, |c| c.0));
         let parts = self.tile.parts(other);
         if let Some((sun, done)) = &mut self.coming {
             for part in *done..(*done + share).min(parts) {
@@ -1062,9 +1065,11 @@ impl Clouds {
         }
     }
 
-    /// Parts of a tile that a frame bakes.
-    fn share(&self, tile: usize) -> u32 {
-        self.tile.parts(tile).div_ceil(self.quality.frames).max(1)
+    /// Parts of a tile that a frame bakes; the fewer the dearer they are for a low sun.
+    fn share(&self, tile: usize, to_sun: Vec3) -> u32 {
+        let cost = self.tile.cost(&self.deck, to_sun.to_array());
+        let frames = f64::from(self.quality.frames) * cost;
+        (f64::from(self.tile.parts(tile)) / frames).ceil().max(1.0) as u32
     }
 
     /// Whether a ray of the picture can meet the layer.

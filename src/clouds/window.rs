@@ -3,7 +3,6 @@
 use glam::Vec3;
 
 use super::order_table::Source;
-use super::tile::slant;
 use super::{CloudDeck, CloudQuality, fault};
 use crate::error::Error;
 use crate::exchange::compute;
@@ -29,6 +28,15 @@ const STRIP_ROWS: u32 = 64;
 const GROWTH: f64 = 16.0;
 /// A part of a window takes a stretch of this much of the uniform buffer (bytes).
 const STRIDE: u64 = 256;
+
+/// Horizontal way per metre of height of the rays of a sun that is taken to be at least so high, and their whole way.
+pub(super) fn slant([x, y, z]: [f32; 3], lowest: f32) -> ([f32; 2], f32) {
+    let rise = y.max(lowest);
+    let across = (x * x + z * z).sqrt();
+    // The same length whatever the rise.
+    let level = (1.0 - rise * rise).max(0.0).sqrt() / across.max(1e-12);
+    ([x * level / rise, z * level / rise], 1.0 / rise)
+}
 
 /// How finely windows about the eye are baked, which take a tile's place for a layer that does not repeat near enough.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -164,7 +172,7 @@ fn sizes(deck: &CloudDeck, quality: &WindowQuality, far: f64) -> (u32, u64) {
         levels,
         fineness,
     } = *quality;
-    let rise = f64::from(deck.lowest_sun(levels));
+    let rise = f64::from(deck.lowest_window_sun(levels));
     let across = 0.5 * deck.thickness * (1.0 / (rise * rise) - 1.0).max(0.0).sqrt();
     let held = 1.0 - 2.0 * MARGIN / f64::from(texels);
     let finest = f64::from(texels) * deck.wavelength / f64::from(fineness);
@@ -636,7 +644,7 @@ impl Windows {
         let to_sun = sun.or(own).unwrap_or(Vec3::Y);
         let slot = self.slot(k, turned || sun.is_some());
         let deck = baker.deck;
-        let (shear, slant) = slant(to_sun.to_array(), deck.lowest_sun(self.levels));
+        let (shear, slant) = slant(to_sun.to_array(), deck.lowest_window_sun(self.levels));
         let shape = deck.shape.clone().unwrap_or_default();
         let n = i64::from(self.texels);
         // Whole turns are none.
@@ -740,7 +748,7 @@ impl Windows {
             let cell = widest.cell[a].rem_euclid(i64::from(self.texels)) as f64;
             ((cell + widest.frac[a]) / edge) as f32
         };
-        let lowest = deck.lowest_sun(self.levels);
+        let lowest = deck.lowest_window_sun(self.levels);
         let sheared = |sun: Vec3| slant(sun.to_array(), lowest).0;
         let sun = self.sun.unwrap_or(Vec3::Y);
         let turning = self.turning.map_or((sun, count), |t| (t.to_sun, t.turned));
@@ -776,7 +784,7 @@ impl Windows {
 
     /// The distance that rays end at at the farthest (m): what the widest window holds for every sun.
     pub fn reach(&self, deck: &CloudDeck) -> f64 {
-        let rise = f64::from(deck.lowest_sun(self.levels));
+        let rise = f64::from(deck.lowest_window_sun(self.levels));
         let across = 0.5 * deck.thickness * (1.0 / (rise * rise) - 1.0).max(0.0).sqrt();
         (self.half(self.count() - 1) - across).max(0.0)
     }

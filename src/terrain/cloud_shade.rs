@@ -13,11 +13,13 @@ pub(super) struct CloudShade {
     /// The tile that is bound; none for the clear one.
     tile: Option<wgpu::TextureView>,
     pub group: wgpu::BindGroup,
-    held: [f32; 11],
+    held: [f32; 13],
 }
 
 /// The fields of `CloudTile` for no clouds: everything is lit by the one texel of the clear tile.
-const CLEAR: [f32; 11] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
+const CLEAR: [f32; 13] = [
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0,
+];
 
 /// Bytes of these fields, as they are written.
 pub(super) const CLOUD_BYTES: u32 = 4 * CLEAR.len() as u32;

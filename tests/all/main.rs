@@ -4,6 +4,7 @@ mod accuracy;
 mod air;
 mod atmosphere;
 mod cloud_frames;
+mod cloud_suns;
 mod cloud_windows;
 mod clouds;
 mod common;

@@ -1,6 +1,6 @@
 //! The cloud layer from a baked tile: density and optical depth to the sun in one fetch, in coordinates that follow the sun's rays.
 //! source   columns along the sun: ours; energy-conserving step: Hillaire2015
-//! symbols  t distance along the view ray [m] · shear horizontal way of a sun's ray per metre of height [1]
+//! symbols  t distance along the view ray [m] · shear horizontal way of a column per metre of height [1]
 #define_import_path veduta::clouds::tile
 
 #import veduta::planet::shell::{ShellSegment, altitude_along, shell_segment, clip_segment, segment_length, segment_distance}
@@ -12,8 +12,10 @@
 struct CloudTile {
     /// Where the eye's foot point lies on it, in tiles.
     place: vec2<f32>,
-    /// Horizontal way of a sun's ray, over its rise.
+    /// Horizontal way of the tile's columns, over their rise: that of a sun's ray, or 0 for a low sun.
     shear: vec2<f32>,
+    /// Horizontal way of a sun's ray, over its rise.
+    sunward: vec2<f32>,
     /// Tiles a metre [1/m].
     tiles_per_metre: f32,
     /// Altitude of the lower sphere [m].
@@ -56,7 +58,7 @@ fn tile_at(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: v
 fn cloud_shadow(tile: texture_3d<f32>, linear: sampler, layer: CloudTile, relative: vec2<f32>, altitude: f32) -> f32 {
     // Where the sun's ray meets the layer.
     let met = clamp(altitude, layer.bottom, layer.bottom + layer.thickness);
-    return exp(-tile_at(tile, linear, layer, relative + layer.shear * (met - altitude), met).y);
+    return exp(-tile_at(tile, linear, layer, relative + layer.sunward * (met - altitude), met).y);
 }
 
 /// Light of all orders along a ray through the layer, in parts that light and phase function weigh.

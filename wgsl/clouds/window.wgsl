@@ -92,7 +92,7 @@ fn window_at(stack: texture_3d<f32>, linear: sampler, windows: CloudWindows, rel
 /// source  ours
 fn march_windows(stack: texture_3d<f32>, linear: sampler, windows: CloudWindows, ground_radius: f32, eye_altitude: f32, dir: vec3<f32>, max_distance: f32,
     min_transmittance: f32, steps: i32, start: f32) -> CloudLight {
-    let spheres = CloudTile(windows.place, windows.shear, windows.per_metre, windows.bottom, windows.thickness, windows.levels, windows.extinction, windows.clear, windows.least);
+    let spheres = CloudTile(windows.place, windows.shear, windows.shear, windows.per_metre, windows.bottom, windows.thickness, windows.levels, windows.extinction, windows.clear, windows.least);
     let path = tile_path(spheres, ground_radius, eye_altitude, dir, max_distance, steps);
     let deepest = -log(max(min_transmittance, 1e-20));
     var t = segment_distance(path.segment, 0.0);
@@ -169,7 +169,7 @@ fn window_cells_at(cells: texture_3d<f32>, mean: texture_3d<f32>, linear: sample
 /// source  ours
 fn march_windows_orders(stack: texture_3d<f32>, cells: texture_3d<f32>, mean_cells: texture_3d<f32>, linear: sampler, windows: CloudWindows, kept: f32, nu: f32,
     ground_radius: f32, eye_altitude: f32, dir: vec3<f32>, max_distance: f32, min_transmittance: f32, steps: i32, start: f32) -> OrderedLight {
-    let spheres = CloudTile(windows.place, windows.shear, windows.per_metre, windows.bottom, windows.thickness, windows.levels, windows.extinction, windows.clear, windows.least);
+    let spheres = CloudTile(windows.place, windows.shear, windows.shear, windows.per_metre, windows.bottom, windows.thickness, windows.levels, windows.extinction, windows.clear, windows.least);
     let path = tile_path(spheres, ground_radius, eye_altitude, dir, max_distance, steps);
     let deepest = -log(max(min_transmittance, 1e-20)) / max(kept, 1e-3);
     var t = segment_distance(path.segment, 0.0);

@@ -219,7 +219,7 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     far = select(min(far, max(reached, 0.0)), far, depth == draw_view.sky_depth || reached > 1e8);
 #endif
 #ifndef CLOUD_WINDOW
-    let layer = CloudTile(draw_view.place, draw_view.shear, draw_view.tiles_per_metre, draw_view.bottom, draw_view.thickness, draw_view.levels, draw_view.extinction, draw_view.clear, draw_view.least);
+    let layer = CloudTile(draw_view.place, draw_view.shear, vec2<f32>(0.0), draw_view.tiles_per_metre, draw_view.bottom, draw_view.thickness, draw_view.levels, draw_view.extinction, draw_view.clear, draw_view.least);
 #endif
     let nu = clamp(dot(dir, draw_view.to_sun), -1.0, 1.0);
     let start = select(0.0, fract(blue_mask(vec2<u32>(in.position.xy)) + draw_view.start), CLOUD_MASK != 0);

@@ -34,6 +34,7 @@ struct LayerProbe {
     to_sun: vec3<f32>,
     ground_radius: f32,
     shear: vec2<f32>,
+    sunward: vec2<f32>,
     edge: f32,
     levels: f32,
     bottom: f32,
@@ -137,7 +138,7 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     let dir = ray.dir;
 #ifdef CLOUD_SHADOW
     // A point across instead of a direction.
-    let shade = CloudTile(vec2<f32>(0.0), probe.shear, 1.0 / probe.edge, probe.bottom, probe.thickness, probe.levels, probe.extinction, 0.0, probe.least);
+    let shade = CloudTile(vec2<f32>(0.0), probe.shear, probe.sunward, 1.0 / probe.edge, probe.bottom, probe.thickness, probe.levels, probe.extinction, 0.0, probe.least);
     results[id.x] = LayerLight(0.0, cloud_shadow(tile, linear, shade, dir.xz, ray.altitude));
 #else
     let ground = ground_distance(probe.ground_radius, ray.altitude, dir.y);
@@ -145,7 +146,7 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     let nu = dot(dir, probe.to_sun);
     let phase = probe.albedo * phase_double_henyey_greenstein(nu, probe.g_forward, probe.g_backward, probe.backward_share);
 #ifdef CLOUD_TILE
-    let layer = CloudTile(vec2<f32>(0.0), probe.shear, 1.0 / probe.edge, probe.bottom, probe.thickness, probe.levels, probe.extinction, 0.0, probe.least);
+    let layer = CloudTile(vec2<f32>(0.0), probe.shear, probe.sunward, 1.0 / probe.edge, probe.bottom, probe.thickness, probe.levels, probe.extinction, 0.0, probe.least);
     let light = march_tile(tile, linear, layer, probe.ground_radius, ray.altitude, dir, far, 1e-6, 2048, 0.0);
     let at = altitude_along(probe.ground_radius, ray.altitude, dir.y, light.mean_distance);
     let mu = direction_cosine_along(probe.ground_radius, ray.altitude, at, probe.to_sun.y, nu, light.mean_distance);

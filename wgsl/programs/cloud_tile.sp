@@ -58,6 +58,11 @@ struct TileRows {
 #ifdef CLOUD_MAPPED
 @group(1) @binding(0) var weather: texture_2d<f32>;
 #endif
+#ifdef CLOUD_LOW_SUN
+// Two for each level: the texels that its rays have gone from their column and row, within the tile, and the way to the level above [m]; the parts that the way is taken in, and
+// the depth of one at full density.
+@group(1) @binding(1) var<storage, read> ways: array<vec4<f32>>;
+#endif
 @group(2) @binding(0) var<storage, read_write> texels: array<u32>;
 
 #ifdef CLOUD_WIDE
@@ -67,10 +72,13 @@ const TEXELS: i32 = 1;
 const TEXELS: i32 = 2;
 #endif
 
-// Density before its cut above a column of the tile.
-fn density_over(layer: CloudLayer, column: i32, row: i32, up: f32) -> f32 {
-    let foot = (vec2<f32>(f32(column), f32(tile.first_row + row)) + 0.5) / f32(tile.texels) * tile.edge;
-    let at = foot + tile.shear * up;
+fn layer_of() -> CloudLayer {
+    return CloudLayer(vec3<u32>(0u), tile.turns_per_metre, tile.period_doublings, 0.5, tile.bottom, tile.thickness, tile.coverage, tile.uniformity,
+        tile.extinction, 1.0, 0.0, 0.0, 0.0, tile.seed);
+}
+
+// Density before its cut at a place on the tile, so high above its lowest level.
+fn density_over(layer: CloudLayer, at: vec2<f32>, up: f32) -> f32 {
     // Not beyond the spheres by rounding.
     let altitude = clamp(tile.bottom + up, tile.bottom, tile.bottom + tile.thickness);
 #ifdef CLOUD_SHAPED
@@ -93,32 +101,66 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
     if column >= across * tile.rows {
         return;
     }
-    let layer = CloudLayer(vec3<u32>(0u), tile.turns_per_metre, tile.period_doublings, 0.5, tile.bottom, tile.thickness, tile.coverage, tile.uniformity,
-        tile.extinction, 1.0, 0.0, 0.0, 0.0, tile.seed);
+    let layer = layer_of();
     let i = column % across;
     let row = column / across;
     let height = tile.thickness / f32(tile.levels - 1);
+    let texel = tile.edge / f32(tile.texels);
     let scale = tile.extinction * height * tile.slant;
     // Rows of copies begin at multiples of 256 bytes.
     let words = (tile.texels + 64 * TEXELS - 1) / (64 * TEXELS) * 64;
+#ifndef CLOUD_LOW_SUN
+    let foot = (vec2<f32>(f32(TEXELS * i), f32(tile.first_row + row)) + 0.5) * texel;
+#endif
     var above = vec2<f32>(0.0);
     var depth = vec2<f32>(0.0);
+#ifdef CLOUD_LOW_SUN
+    // From level to level along a ray, in parts; columns of the tile stand upright, and the ray is now in one, now in another.
+    for (var j = tile.levels - 1; j >= 0; j--) {
+        let way = ways[2 * j];
+        let parts = ways[2 * j + 1];
+        let column = (TEXELS * i + i32(way.x)) % tile.texels;
+        let foot = (vec2<f32>(f32(column), f32((tile.first_row + row + i32(way.y)) % tile.texels)) + 0.5) * texel;
+        var left = 0.0;
+        var right = 0.0;
+        for (var k = i32(parts.x) - 1; k >= 0; k--) {
+            let share = f32(k) / parts.x;
+            let up = (f32(j) + share) * height;
+            left = density_over(layer, foot + share * way.zw, up);
+            depth.x += parts.y * mean_density(above.x, left);
+            above.x = left;
+#ifndef CLOUD_WIDE
+            right = density_over(layer, foot + share * way.zw + vec2<f32>(texel, 0.0), up);
+            depth.y += parts.y * mean_density(above.y, right);
+            above.y = right;
+#endif
+        }
+#ifdef CLOUD_WIDE
+        let word = half_word(vec2<f32>(left, min(depth.x, 6e4)));
+#else
+        let word = pack4x8unorm(vec4<f32>(tile_code(left, depth.x, tile.least), tile_code(right, depth.y, tile.least)));
+#endif
+        texels[(j * tile.rows + row) * words + column / TEXELS] = word;
+    }
+#else
     for (var j = tile.levels - 1; j >= 0; j--) {
         let up = f32(j) * height;
         let gain = select(scale, 0.0, j == tile.levels - 1);
-        let left = density_over(layer, TEXELS * i, row, up);
+        let place = foot + tile.shear * up;
+        let left = density_over(layer, place, up);
         depth.x += gain * mean_density(above.x, left);
         above.x = left;
 #ifdef CLOUD_WIDE
         let word = half_word(vec2<f32>(left, min(depth.x, 6e4)));
 #else
-        let right = density_over(layer, 2 * i + 1, row, up);
+        let right = density_over(layer, place + vec2<f32>(texel, 0.0), up);
         depth.y += gain * mean_density(above.y, right);
         above.y = right;
         let word = pack4x8snorm(vec4<f32>(tile_code(left, depth.x, tile.least), tile_code(right, depth.y, tile.least)));
 #endif
         texels[(j * tile.rows + row) * words + i] = word;
     }
+#endif
 }
     }#
 }#

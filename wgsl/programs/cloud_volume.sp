@@ -100,7 +100,7 @@ fn sampled(relative: vec2<f32>, altitude: f32) -> vec2<f32> {
 }
 #else
 fn sampled(relative: vec2<f32>, altitude: f32) -> vec2<f32> {
-    let layer = CloudTile(vec2<f32>(0.0), grid.shear, 1.0 / grid.size, grid.bottom, grid.thickness, grid.levels, grid.extinction, 0.0, grid.least);
+    let layer = CloudTile(vec2<f32>(0.0), grid.shear, vec2<f32>(0.0), 1.0 / grid.size, grid.bottom, grid.thickness, grid.levels, grid.extinction, 0.0, grid.least);
     return tile_at(tile, linear, layer, relative, altitude);
 }
 #endif
