@@ -17,8 +17,8 @@ pub use deck::{CloudDeck, CloudShape, back_to_front};
 pub use layer_rays::{LayerOptions, layer_light, layer_shadow};
 pub use system::{CloudLights, CloudQuality, CloudShadow, Clouds, CloudsOptions};
 pub use tile::LOWEST_SUN;
-pub use window::WindowQuality;
 pub use volume::{CubeLight, CubeOptions, CubeRay, DensityCube, cube_light};
+pub use window::WindowQuality;
 
 /// Which light of a cloud is counted and how it is found: the same as of the air.
 pub use crate::atmosphere::{Orders, ProbePath};

@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
-use super::{CloudDeck, CloudQuality, fault};
 use super::order_table::Source;
 use super::tile::slant;
+use super::{CloudDeck, CloudQuality, fault};
 use crate::error::Error;
 use crate::exchange::compute;
 use crate::landscape::Work;
@@ -268,10 +268,7 @@ impl Windows {
             pipeline,
             parts,
             staging,
-            uniform: buffer(
-                WindowsBlock::SIZE as u64,
-                Usage::UNIFORM | Usage::COPY_DST,
-            ),
+            uniform: buffer(WindowsBlock::SIZE as u64, Usage::UNIFORM | Usage::COPY_DST),
             held: Vec::new(),
             windows: vec![
                 Window {
@@ -461,7 +458,10 @@ impl Windows {
         let far = i64::from(self.texels / 2);
         // How far the eye is from the middle.
         let off = |w: &Window, axis: usize| at.cell[axis] - far - w.corner[axis];
-        if [0, 1].iter().any(|a| off(&self.windows[k], *a).abs() >= far) {
+        if [0, 1]
+            .iter()
+            .any(|a| off(&self.windows[k], *a).abs() >= far)
+        {
             self.windows[k] = Window {
                 corner: self.corner_about(at),
                 rows: 0,
@@ -591,7 +591,10 @@ impl Windows {
         let k = turning.turned - 1;
         let aim = self.corner_about(place.over(k));
         let lost = i64::from(self.texels / 8);
-        if [0, 1].iter().any(|a| (aim[*a] - turning.corner[*a]).abs() > lost) {
+        if [0, 1]
+            .iter()
+            .any(|a| (aim[*a] - turning.corner[*a]).abs() > lost)
+        {
             // The eye has left it behind.
             (turning.corner, turning.rows) = (aim, 0);
         }

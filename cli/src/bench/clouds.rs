@@ -110,11 +110,7 @@ impl Canvas<'_> {
     }
 
     /// A frame; milliseconds, and what it has baked.
-    pub fn draw_and_count(
-        &self,
-        clouds: &mut Clouds,
-        view: &View,
-    ) -> Result<(f64, u32), CliError> {
+    pub fn draw_and_count(&self, clouds: &mut Clouds, view: &View) -> Result<(f64, u32), CliError> {
         let gpu = &self.bench.gpu;
         let lights = CloudLights {
             sun: view.sun.irradiance,

@@ -7,7 +7,8 @@ use indicatif::ProgressBar;
 use crate::bench::knob::{self, Effect, Knob};
 use crate::bench::timing::{Clock, Rounds};
 use crate::bench::{
-    Bench, baseline, chapter6, cloud_flight, clouds, frames, ground, noise, presets, sky, terrain, write_text,
+    Bench, baseline, chapter6, cloud_flight, clouds, frames, ground, noise, presets, sky, terrain,
+    write_text,
 };
 use crate::catalog::{Catalog, SourceArgs};
 use crate::commands::render::{RenderArgs, read_json, write_json};
@@ -208,7 +209,8 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 Subject::Clouds,
                 Subject::Flight,
                 Subject::Frames,
-            ]) || (matches!(subject, Subject::Knob | Subject::Clouds | Subject::Flight) && args.views.len() > 1),
+            ]) || (matches!(subject, Subject::Knob | Subject::Clouds | Subject::Flight)
+                && args.views.len() > 1),
             "left out, or the subject `presets`, `terrain` or `frames`, or one view of a knob or of clouds",
         ),
         (
