@@ -104,11 +104,15 @@ fn system_variants(program: &str) -> Vec<BTreeSet<String>> {
             ];
         }
         "cloud_layer" => {
-            let ways: [&[&str]; 4] = [
+            let ways: [&[&str]; 8] = [
                 &[],
                 &["CLOUD_OVER_DEPTH"],
                 &["CLOUD_ORDERS"],
                 &["CLOUD_ORDERS", "CLOUD_OVER_DEPTH"],
+                &["CLOUD_ABOVE"],
+                &["CLOUD_ABOVE", "CLOUD_OVER_DEPTH"],
+                &["CLOUD_ABOVE", "CLOUD_ORDERS"],
+                &["CLOUD_ABOVE", "CLOUD_ORDERS", "CLOUD_OVER_DEPTH"],
             ];
             let airs: [&[&str]; 3] = [&[], &["CLOUD_AIR"], &["CLOUD_AIR", "AIR_EIGHT_LANES"]];
             let set = |way: &[&str], air: &[&str]| {

@@ -18,6 +18,7 @@ pub use deck::{CloudDeck, CloudShape, back_to_front};
 pub use layer_rays::{LayerOptions, layer_light, layer_shadow};
 pub use system::{CloudLights, CloudQuality, CloudShadow, Clouds, CloudsOptions};
 pub use tile::LOWEST_SUN;
+pub(crate) use tile::{CLEAR, clear_tile};
 pub use volume::{CubeLight, CubeOptions, CubeRay, DensityCube, cube_light};
 pub use weather::{WeatherMap, WeatherTexels};
 pub use window::WindowQuality;

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::order_table::{OrderTable, Source, check_cells};
-use super::tile::{Tile, slant};
+use super::tile::{CLEAR, Tile, clear_tile, slant};
 use super::window::{WindowQuality, Windows};
 use super::{AirLights, CloudDeck, Orders, fault};
 use crate::atmosphere::{Atmosphere, SkyTables};
@@ -162,6 +162,8 @@ pub struct CloudsOptions {
     pub shadows: bool,
     /// The air before the clouds, if they are to show it to eyes within the air; to those above it clouds show none: [`Clouds::set_air`] tells the tables of the sky that it is taken from. The picture below must have its air in it already.
     pub air: Option<Atmosphere>,
+    /// Whether another layer shades this one, which [`Clouds::set_above`] tells.
+    pub under: bool,
     /// Which light: scattered once, with what comes from sky and ground scattered without shadows; or any number of times, of all three.
     pub orders: Orders,
 }
@@ -176,6 +178,7 @@ impl Default for CloudsOptions {
             over_depth: false,
             shadows: false,
             air: None,
+            under: false,
             orders: Orders::All,
         }
     }
@@ -233,6 +236,8 @@ pub struct Clouds {
     air_features: Option<&'static [&'static str]>,
     /// The tables of the sky, the colour of its sun and the thickness of the air (m).
     air: Option<(wgpu::BindGroup, Vec3, f64)>,
+    /// The layer that shades this one.
+    above: Option<Above>,
     /// One for each tile.
     groups: Vec<wgpu::BindGroup>,
     /// Which tile is shown, and for which sun it was baked; none before the first.
@@ -248,6 +253,18 @@ pub struct Clouds {
     /// Way in the clear (m).
     clear: f64,
     seen: bool,
+}
+
+/// A layer that shades another.
+#[derive(Debug)]
+struct Above {
+    layer: wgpu::Buffer,
+    /// Bound where there is none.
+    clear: wgpu::TextureView,
+    /// Its tile; none for the clear one.
+    tile: Option<wgpu::TextureView>,
+    /// The fields of `CloudTile` that the buffer holds; none before the first.
+    held: Option<[f32; 13]>,
 }
 
 /// What a layer in half as many pixels a side is laid over a picture with.
@@ -395,6 +412,9 @@ impl Clouds {
         if orders.is_some() {
             features.push("CLOUD_ORDERS");
         }
+        if options.under {
+            features.push("CLOUD_ABOVE");
+        }
         let air_features = options.air.as_ref().map(Atmosphere::features);
         if let (Some(air), Some(own)) = (&options.air, air_features) {
             air.check()?;
@@ -487,6 +507,17 @@ impl Clouds {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
+        let above = options.under.then(|| Above {
+            layer: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("veduta clouds above"),
+                size: 64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            clear: clear_tile(device),
+            tile: None,
+            held: None,
+        });
         let view_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("veduta cloud view"),
             layout: &layouts[0],
@@ -494,6 +525,7 @@ impl Clouds {
                 Some((0, &view)),
                 orders.as_ref().map(|table| (1, &table.weights)),
                 windows.as_ref().map(|windows| (2, &windows.uniform)),
+                above.as_ref().map(|above| (3, &above.layer)),
             ]
             .into_iter()
             .flatten()
@@ -542,6 +574,7 @@ impl Clouds {
             over_depth: options.over_depth,
             shadows: options.shadows,
             air_features,
+            above,
             air: None,
             groups: Vec::new(),
             shown: None,
@@ -592,6 +625,13 @@ impl Clouds {
                             resource: wgpu::BindingResource::TextureView(mean),
                         });
                     }
+                }
+                if let Some(above) = &self.above {
+                    let tile = above.tile.as_ref().unwrap_or(&above.clear);
+                    entries.push(wgpu::BindGroupEntry {
+                        binding: 6,
+                        resource: wgpu::BindingResource::TextureView(tile),
+                    });
                 }
                 device.create_bind_group(&wgpu::BindGroupDescriptor {
                     label: Some("veduta clouds"),
@@ -722,6 +762,41 @@ impl Clouds {
         Ok(())
     }
 
+    /// Tells the shadow of a layer above, with [`CloudsOptions::under`]; none for none. In every frame, after the `prepare` of that layer for the same view, which has
+    /// [`CloudsOptions::shadows`] if it may be out of view where its shadow is not. The sun's light that comes straight through it, at the mean distance of what a ray sees of this layer, is the
+    /// light that a ray's clouds have, also of all orders: one fetch of its tile a pixel. What it scatters down is the host's to add to [`CloudLights::above`]. A layer below shades nothing.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for clouds that were made without `under`.
+    pub fn set_above(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        shadow: Option<&CloudShadow<'_>>,
+    ) -> Result<Work, Error> {
+        let Some(above) = &mut self.above else {
+            let domain = "true for clouds that are told a layer above";
+            return Err(fault("options.under", false, domain));
+        };
+        let mut work = Work::default();
+        let layer = shadow.map_or(CLEAR, |s| s.layer);
+        if above.held != Some(layer) {
+            let bytes = layer.map(f32::to_le_bytes).concat();
+            queue.write_buffer(&above.layer, 0, &bytes);
+            work.writes = 1;
+            work.bytes = bytes.len() as u64;
+            above.held = Some(layer);
+        }
+        let tile = shadow.map(|s| s.tile);
+        if tile != above.tile.as_ref() {
+            above.tile = tile.cloned();
+            if !self.groups.is_empty() {
+                self.bind(device);
+            }
+        }
+        Ok(work)
+    }
+
     /// Tells a host's own map of the weather, in the place of the layer's: a 2D texture of floats whose first two numbers are coverage and kind, in [0, 1] (others are cut off), over the
     /// extent of the layer's map, which must have one to begin with. All tiles are baked anew, the first in the next frame, and so again after each call: tell a texture that has changed once more.
     /// Where it falls from 1 to 0 from texel to texel no step in the clear passes over it, so that its marches are slower than those of a smooth map of the layer's own.
@@ -797,6 +872,7 @@ impl Clouds {
         let laid = u32::from(self.half.is_some());
         let held = u32::from(coarse.is_some());
         let (map_bytes, mapped) = self.tile.weather();
+        let under = u32::from(self.above.is_some());
         let (maps, mapped) = (u32::from(map_bytes > 0), u32::from(mapped));
         let coarse_bytes = coarse.map_or(0, |(view, _)| {
             8 * u64::from(view.texture().width()) * u64::from(view.texture().height())
@@ -808,23 +884,26 @@ impl Clouds {
                 + 3
                 + own
                 + more
-                + (2 + more + u32::from(self.over_depth)) * tiles
+                + (2 + more + under + u32::from(self.over_depth)) * tiles
+                + under
                 + 2 * groups
                 + 5 * air
                 + laid
                 + 2 * mapped
                 + held * (1 + u32::from(self.over_depth)),
-            buffers: self.tile.slots() + 3 + 3 * own + buffers,
+            buffers: self.tile.slots() + 3 + 3 * own + buffers + under,
             buffer_bytes: self.tile.buffer_bytes()
                 + windows.map_or(0, Windows::buffer_bytes)
                 + DrawBlock::SIZE as u64
-                + bytes,
-            textures: self.tile.views.len() as u32 + own + more + held + maps,
+                + bytes
+                + 64 * u64::from(under),
+            textures: self.tile.views.len() as u32 + own + more + held + maps + under,
             texture_bytes: self.tile.texture_bytes()
                 + windows.map_or(0, Windows::texture_bytes)
                 + textures
                 + coarse_bytes
-                + map_bytes,
+                + map_bytes
+                + 4 * u64::from(under),
             samplers: 1 + own,
         }
     }
@@ -991,6 +1070,11 @@ impl Clouds {
             block.least,
         ]);
         let bytes = block.to_bytes().to_vec();
+        if let Some(above) = self.above.as_mut().filter(|above| above.held.is_none()) {
+            queue.write_buffer(&above.layer, 0, &CLEAR.map(f32::to_le_bytes).concat());
+            above.held = Some(CLEAR);
+            work.writes += 1;
+        }
         if bytes != self.held {
             queue.write_buffer(&self.view, 0, &bytes);
             work.writes += 1;

@@ -13,6 +13,27 @@ use crate::programs::blocks::TileRows as RowsBlock;
 /// rays; below they stand upright, and depths are summed along rays in parts.
 pub const LOWEST_SUN: f32 = 0.017_452;
 
+/// The fields of `CloudTile` for no clouds: everything is lit by the one texel of the clear tile.
+pub(crate) const CLEAR: [f32; 13] = [
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0,
+];
+
+/// A tile without depth.
+pub(crate) fn clear_tile(device: &wgpu::Device) -> wgpu::TextureView {
+    device
+        .create_texture(&wgpu::TextureDescriptor {
+            label: Some("veduta no clouds"),
+            size: Default::default(),
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D3,
+            format: wgpu::TextureFormat::Rg16Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        })
+        .create_view(&Default::default())
+}
+
 /// Rows that are baked at once: what the buffer between program and texture holds.
 const ROWS: u32 = 8;
 
@@ -94,8 +115,14 @@ pub(super) fn slant(to_sun: [f32; 3], lowest: f32) -> Slant {
     let [x, y, z] = to_sun;
     let rise = y.clamp(LOWEST_SUN, 1.0);
     let across = (x * x + z * z).sqrt();
+    // One that is straight below lies in no direction: any will do.
+    let ([x, z], across) = if across > 1e-6 {
+        ([x, z], across)
+    } else {
+        ([1.0, 0.0], 1.0)
+    };
     // The same length whatever the rise.
-    let level = (1.0 - rise * rise).sqrt() / across.max(1e-12);
+    let level = (1.0 - rise * rise).sqrt() / across;
     let sunward = [x * level / rise, z * level / rise];
     let low = rise < lowest;
     Slant {
@@ -378,7 +405,6 @@ impl Tile {
             weather_doublings: shape.weather_doublings,
             least: self.least,
             repeats: shape.map.map_or(1, |m| m.repeats(deck.period())),
-            ..Default::default()
         };
         let (uniform, bound) = &self.slots[part as usize];
         let bytes = block.to_bytes();

@@ -1,6 +1,6 @@
 //! Shadows of clouds on the ground of a plane.
 
-use crate::clouds::CloudShadow;
+use crate::clouds::{CLEAR, CloudShadow, clear_tile};
 use crate::error::Error;
 
 /// What the program `terrain` reads of a layer of clouds.
@@ -16,12 +16,7 @@ pub(super) struct CloudShade {
     held: [f32; 13],
 }
 
-/// The fields of `CloudTile` for no clouds: everything is lit by the one texel of the clear tile.
-const CLEAR: [f32; 13] = [
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0,
-];
-
-/// Bytes of these fields, as they are written.
+/// Bytes of the fields of `CloudTile`, as they are written.
 pub(super) const CLOUD_BYTES: u32 = 4 * CLEAR.len() as u32;
 
 /// Bytes of the uniform that holds them.
@@ -45,19 +40,10 @@ impl CloudShade {
             .map_err(|e| Error::Device(e.to_string()))?
             .copy_from_slice(&CLEAR.map(f32::to_le_bytes).concat());
         layer.unmap();
-        let tile = device
-            .create_texture(&wgpu::TextureDescriptor {
-                label: Some("veduta no clouds"),
-                size: Default::default(),
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D3,
-                format: wgpu::TextureFormat::Rg16Float,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            })
-            .create_view(&Default::default());
-        let clear = (tile, device.create_sampler(&Default::default()));
+        let clear = (
+            clear_tile(device),
+            device.create_sampler(&Default::default()),
+        );
         Ok(CloudShade {
             group: bound(device, layout, &layer, &clear.0, &clear.1),
             layout: layout.clone(),

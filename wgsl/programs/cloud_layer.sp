@@ -79,17 +79,32 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #else
 #import veduta::clouds::window::{CloudWindows, march_windows}
 #endif
+#ifdef CLOUD_ABOVE
+#import veduta::clouds::tile::{CloudTile, cloud_shadow}
+#endif
 #else
 #ifdef CLOUD_ORDERS
+#ifdef CLOUD_ABOVE
+#import veduta::clouds::tile::{CloudTile, march_tile_orders, cloud_shadow}
+#else
 #import veduta::clouds::tile::{CloudTile, march_tile_orders}
+#endif
+#else
+#ifdef CLOUD_ABOVE
+#import veduta::clouds::tile::{CloudTile, march_tile, cloud_shadow}
 #else
 #import veduta::clouds::tile::{CloudTile, march_tile}
+#endif
 #endif
 #endif
 #ifndef CLOUD_ORDERS
 #import veduta::lighting::phase::{phase_double_henyey_greenstein}
 #endif
+#ifdef CLOUD_ABOVE
+#import veduta::planet::shell::{ground_distance, altitude_along}
+#else
 #import veduta::planet::shell::{ground_distance}
+#endif
 #ifdef CLOUD_AIR
 #import veduta::atmosphere::medium::{Air}
 #import veduta::atmosphere::sky_view::{SkyEye, sky_place_shown}
@@ -172,6 +187,12 @@ fn weight_at(i: i32) -> vec2<f32> {
 }
 #endif
 
+#ifdef CLOUD_ABOVE
+// Another layer that shades this one.
+@group(0) @binding(3) var<uniform> other: CloudTile;
+@group(1) @binding(6) var other_tile: texture_3d<f32>;
+#endif
+
 override CLOUD_STEPS: i32 = 64;
 // Whether half as many pixels a side are drawn as the host's picture has.
 override CLOUD_HALF: i32 = 0;
@@ -202,6 +223,16 @@ fn laid(dir: vec3<f32>, light: vec3<f32>, transmittance: f32, mean_distance: f32
     return vec4<f32>(front.transmittance * light + (1.0 - transmittance) * front.in_scatter * draw_view.air_light, transmittance);
 #else
     return vec4<f32>(light, transmittance);
+#endif
+}
+
+// The sun's light at a distance, behind another layer.
+fn sun_at(altitude: f32, dir: vec3<f32>, distance: f32) -> vec3<f32> {
+#ifdef CLOUD_ABOVE
+    let there = altitude_along(draw_view.ground_radius, altitude, dir.y, distance);
+    return draw_view.sun_light * cloud_shadow(other_tile, linear, other, dir.xz * distance, there);
+#else
+    return draw_view.sun_light;
 #endif
 }
 
@@ -236,7 +267,7 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     // What the peak scatters of the light behind; about the eye's level of both, or there were a line.
     let behind = mix(draw_view.below, draw_view.above, smoothstep(-0.15, 0.15, dir.y)) * (light.kept_transmittance - light.transmittance);
     let around = draw_view.above * light.before.y + draw_view.below * light.before.z + behind;
-    return laid(dir, sun * draw_view.sun_light + around, light.transmittance, light.mean_distance);
+    return laid(dir, sun * sun_at(altitude, dir, light.mean_distance) + around, light.transmittance, light.mean_distance);
 #else
 #ifdef CLOUD_WINDOW
     let light = march_windows(tile, linear, windows, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS, start);
@@ -244,7 +275,7 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     let light = march_tile(tile, linear, layer, draw_view.ground_radius, altitude, dir, far, draw_view.min_transmittance, CLOUD_STEPS, start);
 #endif
     let phase = phase_double_henyey_greenstein(nu, draw_view.g_forward, draw_view.g_backward, draw_view.backward_share);
-    return laid(dir, light.scatter * phase * draw_view.sun_light + (1.0 - light.transmittance) * draw_view.above, light.transmittance, light.mean_distance);
+    return laid(dir, light.scatter * phase * sun_at(altitude, dir, light.mean_distance) + (1.0 - light.transmittance) * draw_view.above, light.transmittance, light.mean_distance);
 #endif
 }
 #endif

@@ -138,7 +138,7 @@ fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
 #ifdef CLOUD_WIDE
         let word = half_word(vec2<f32>(left, min(depth.x, 6e4)));
 #else
-        let word = pack4x8unorm(vec4<f32>(tile_code(left, depth.x, tile.least), tile_code(right, depth.y, tile.least)));
+        let word = pack4x8snorm(vec4<f32>(tile_code(left, depth.x, tile.least), tile_code(right, depth.y, tile.least)));
 #endif
         texels[(j * tile.rows + row) * words + column / TEXELS] = word;
     }
