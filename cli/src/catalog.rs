@@ -513,6 +513,25 @@ impl Catalog {
     }
 }
 
+impl Catalog {
+    /// Sees to it that the set holds a variant of a system's program, with the declared sizes.
+    ///
+    /// # Errors
+    /// As [`Catalog::ensure`].
+    pub fn ensure_variant(&mut self, program: &str, features: &[&str]) -> Result<(), CliError> {
+        if self.set.get(program, features).is_ok() {
+            return Ok(());
+        }
+        let sp = self.program(program)?;
+        let features: BTreeSet<String> = features.iter().map(|f| (*f).to_owned()).collect();
+        let composed = self.composer()?.compose(&sp, &features, &BTreeMap::new())?;
+        let mut composed = veduta::compose::program(&composed)?;
+        composed.program = program.to_owned().into();
+        self.set.programs.to_mut().push(composed);
+        Ok(())
+    }
+}
+
 /// A composer over a library that reads the files of `SRC` tags from what ships where they are there, else from the disk.
 pub fn composer(library: &Library, keys: Keys) -> Composer {
     Composer::new(library, keys).reader(Box::new(|path| match crate::shipped::text(path) {

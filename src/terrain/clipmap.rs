@@ -22,6 +22,9 @@ pub(super) struct ClipmapOptions {
     pub levels: u32,
     /// Distance that the coarsest level shall reach (m), in [100, 4e6].
     pub reach: f64,
+    /// Texels that a sector around the eye is wide, 4, 8 or 16; half as many are a side of the squares of which the greatest heights are kept. Windows move by 32 texels with 4, else by an eighth of a
+    /// level.
+    pub width: u32,
 }
 
 impl Default for ClipmapOptions {
@@ -31,18 +34,10 @@ impl Default for ClipmapOptions {
             texels: 512,
             levels: 16,
             reach: 60_000.0,
+            width: 4,
         }
     }
 }
-
-/// Texels of a side of the squares of which the greatest heights are kept, as in the program `terrain_bake`.
-const PEAK: i64 = 2;
-
-/// By what the windows move (texels), a multiple of [`PEAK`].
-const BLOCK: i64 = 32;
-
-/// Texels that a window keeps between what it serves and its border: half a move, and some.
-const BORDER: i64 = BLOCK / 2 + 4;
 
 /// Rings around the eye at most, a multiple of 64.
 const RINGS: u32 = 1024;
@@ -135,6 +130,11 @@ struct Span {
     to: [i64; 2],
 }
 
+/// Texels that a window which moves by so many keeps between what it serves and its border.
+fn border(block: i64) -> i64 {
+    block / 2 + 4
+}
+
 /// Distance from an eye to the nearest ground (m), about, from heights below it and around it, wherever it looks; over a program's own function the height above all ground, and 1 where that is not
 /// known.
 pub(super) fn nearest_ground(field: &Prepared<f32>, eye: WorldPos) -> f64 {
@@ -206,6 +206,10 @@ pub struct Clipmap {
     field: Prepared<f32>,
     planet_radius: f64,
     texels: i64,
+    /// Texels of a side of the squares of which the greatest heights are kept, as in the program `terrain_bake`.
+    peak: i64,
+    /// By what the windows move (texels), a multiple of `peak`.
+    block: i64,
     spacing: f64,
     levels: usize,
     top: f32,
@@ -300,9 +304,14 @@ impl Clipmap {
         if !(100.0..=4e6).contains(&options.reach) {
             return Err(fault("reach", options.reach.to_string(), "in [100, 4e6] m"));
         }
+        if !matches!(options.width, 4 | 8 | 16) {
+            return Err(fault("width", options.width.to_string(), "4, 8 or 16"));
+        }
         let field = land.field.prepare::<f32>()?;
         let texels = i64::from(options.texels);
-        let half = (texels / 2 - BORDER) as f64;
+        let peak = i64::from(options.width / 2);
+        let block = if options.width == 4 { 32 } else { texels / 8 };
+        let half = (texels / 2 - border(block)) as f64;
         let needed = (options.reach / half).log2().ceil().exp2();
         // From the coarsest on down, as many as there may be.
         let spacing = finest(&land.field)
@@ -344,8 +353,8 @@ impl Clipmap {
         });
         let peaks = texture(
             "veduta peaks",
-            options.texels / PEAK as u32,
-            options.texels / PEAK as u32,
+            options.texels / peak as u32,
+            options.texels / peak as u32,
             levels as u32,
             wgpu::TextureFormat::R32Float,
             wgpu::TextureUsages::STORAGE_BINDING,
@@ -354,11 +363,11 @@ impl Clipmap {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
             ..Default::default()
         });
-        // A sector is about as wide as four texels: narrower ones save rays fewer steps than they cost (measured).
-        let count = options.texels / 2;
+        // Sectors that are narrower than four texels save rays fewer steps than they cost (measured).
+        let count = 2 * options.texels / options.width;
         let sectors = texture(
             "veduta sectors",
-            RINGS + RINGS / 8 + RINGS / 64 + 1,
+            RINGS + RINGS / 8 + RINGS / 64,
             count,
             1,
             wgpu::TextureFormat::R32Float,
@@ -467,6 +476,8 @@ impl Clipmap {
             field,
             planet_radius: land.planet_radius,
             texels,
+            peak,
+            block,
             spacing,
             levels,
             top,
@@ -518,19 +529,21 @@ impl Clipmap {
 
     /// Distance that it reaches on each side of the eye (m).
     pub fn reach(&self) -> f64 {
-        (self.texels / 2 - BORDER) as f64 * self.spacing * ((self.levels - 1) as f64).exp2()
+        (self.texels / 2 - border(self.block)) as f64
+            * self.spacing
+            * ((self.levels - 1) as f64).exp2()
     }
 
     /// Spacing of the finest level that serves places farther than `distance` from the eye along an axis (m), or a little more.
     pub(super) fn coarsest_within(&self, distance: f64) -> f64 {
-        2.0 * distance / (self.texels / 2 - BORDER) as f64
+        2.0 * distance / (self.texels / 2 - border(self.block)) as f64
     }
 
     /// What it keeps on the device.
     pub fn resources(&self) -> Resources {
         let side = self.texels as u64;
         let level = 4 * side * side;
-        let sectors = 4 * self.sectors[0] as u64 * u64::from(RINGS + RINGS / 8 + RINGS / 64 + 1);
+        let sectors = 4 * self.sectors[0] as u64 * u64::from(RINGS + RINGS / 8 + RINGS / 64);
         let slots = self.rectangles.len() as u32;
         let shaded = self.shades.as_ref().map_or(0, |s| s.levels.len());
         let shades = 2 * level * if shaded == 0 { 0 } else { shaded.max(2) as u64 };
@@ -545,7 +558,7 @@ impl Clipmap {
                 + shaded * ShadeBlock::SIZE) as u64,
             samplers: 1,
             textures: 5 + u32::from(shaded > 0),
-            texture_bytes: (level + level / (PEAK * PEAK) as u64) * self.levels as u64
+            texture_bytes: (level + level / (self.peak * self.peak) as u64) * self.levels as u64
                 + shades
                 + sectors
                 + 512
@@ -602,7 +615,9 @@ impl Clipmap {
             }
             places.extend(((1.0 / spacing) as f32).to_le_bytes());
             places.extend((spacing as f32).to_le_bytes());
-            let corner = |cell: i64| (cell - self.texels / 2 + BLOCK / 2).div_euclid(BLOCK) * BLOCK;
+            let corner = |cell: i64| {
+                (cell - (self.texels - self.block) / 2).div_euclid(self.block) * self.block
+            };
             let window = [corner(x.0), corner(z.0)];
             let eye_in: [f32; 2] =
                 [(x, 0), (z, 1)].map(|((cell, rest), k)| ((cell - window[k]) as f64 + rest) as f32);
@@ -670,9 +685,10 @@ impl Clipmap {
         let scale = gaze.near.min(32.0 * texel / width).max(4.0 * texel);
         let span = (gaze.far.min(self.reach() * std::f64::consts::SQRT_2) / scale).asinh();
         let growth = width.max(span / f64::from(RINGS));
-        let reach = (self.texels / 2 - BORDER) as f32;
+        let reach = (self.texels / 2 - border(self.block)) as f32;
+        let rings = ((span / growth / 64.0).ceil() as u32 * 64).min(RINGS);
         let clip = ClipBlock {
-            rings: ((span / growth / 64.0).ceil() as i32 * 64).min(RINGS as i32),
+            rings: rings as i32,
             sectors: self.sectors[0],
             first_sector: self.sectors[1],
             made_sectors: count,
@@ -725,7 +741,7 @@ impl Clipmap {
         pass.set_bind_group(2, &self.bake_target, &[]);
         for (slot, size) in &jobs {
             pass.set_bind_group(0, &self.rectangles[*slot].group, &[]);
-            let [x, z] = size.map(|s| (s as u32).div_ceil(8 * PEAK as u32));
+            let [x, z] = size.map(|s| (s as u32).div_ceil(8 * self.peak as u32));
             pass.dispatch_workgroups(x, z, 1);
             work.dispatches += 1;
         }
@@ -734,7 +750,7 @@ impl Clipmap {
             for (index, group) in (0..).zip(&self.sweep_groups) {
                 pass.set_bind_group(index, group, &[]);
             }
-            pass.dispatch_workgroups(self.sectors[2] as u32, 1, 1);
+            pass.dispatch_workgroups((self.sectors[2] as u32).div_ceil(8), rings / 64, 1);
             work.dispatches += 1;
         }
         if let Some(shades) = &self.shades {

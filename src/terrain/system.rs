@@ -63,7 +63,7 @@ impl TerrainLights {
 /// Choices that are made once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TerrainOptions {
-    /// The quality. Of its keys these are read: CLIP_STEPS, CLIP_TEXELS, REFINE_STEPS, SEARCH_STEPS and TEXTURE_LOW_QUALITY on the plane, GLOBE_STEPS and GLOBE_STEPS_SHADOW over a ball; all others are those of
+    /// The quality. Of its keys these are read: CLIP_STEPS, CLIP_TEXELS, CLIP_WIDTH, REFINE_STEPS, SEARCH_STEPS and TEXTURE_LOW_QUALITY on the plane, GLOBE_STEPS and GLOBE_STEPS_SHADOW over a ball; all others are those of
     /// other systems, and of the landscape's own march.
     pub preset: Preset,
     /// The ground.
@@ -73,7 +73,7 @@ pub struct TerrainOptions {
     /// Sectors in which the horizons around a place take light off the sky (ambient occlusion), in [0, 16]; 0 leaves all of it. Nothing comes of it over a ball.
     pub sky_sectors: u32,
     /// Texels of a side of each level of baked heights: 128, 256, 512 or 1024. A texel is about as wide as a pixel where it is used when this is 3.5 over the angle of a pixel. 0 leaves it to the
-    /// preset's CLIP_TEXELS: 512, or 256 for `low`. Nothing comes of it over a ball, where nothing is baked.
+    /// preset's CLIP_TEXELS: 512, or 256 for `low`. Where they are finer than these, rays take as many more steps. Nothing comes of it over a ball, where nothing is baked.
     pub texels: u32,
     /// Whether a layer of clouds shades the ground, which [`Terrain::set_cloud_shadow`](super::Terrain::set_cloud_shadow) tells. Nothing comes of it over a ball.
     pub cloud_shadows: bool,
@@ -112,6 +112,37 @@ pub(super) struct PlaneTerrain {
     searched: bool,
     /// Whether the view shows any ground.
     seen: bool,
+    /// The nearest ground that was looked for last.
+    looked: Option<Looked>,
+}
+
+/// The nearest ground, of all and in view, as it was found for an eye.
+#[derive(Debug)]
+struct Looked {
+    eye: WorldPos,
+    rays: [Vec3; 3],
+    nearest: f64,
+    shown: Option<[f64; 2]>,
+}
+
+impl Looked {
+    /// The same for an eye that has hardly moved, or turned by no more than samples are shifted in few pixels: nearer by as much as it has moved.
+    fn from_near(&self, eye: WorldPos, rays: [Vec3; 3]) -> Option<(f64, Option<[f64; 2]>)> {
+        let moved = eye.relative_to(self.eye).length();
+        let turned = (0..3).any(|k| {
+            let off = (rays[k] - self.rays[k]).length();
+            off > 0.06 * self.rays[0].length().min(self.rays[2].length())
+        });
+        if turned || moved.is_nan() || moved > 0.05 * self.nearest {
+            return None;
+        }
+        let nearer = |d: f64| (d - moved).max(0.0);
+        Some((
+            nearer(self.nearest),
+            self.shown
+                .map(|[along, through]| [nearer(along), nearer(through)]),
+        ))
+    }
 }
 
 /// A pipeline that draws ground into targets with a depth of the given format, and the layouts of its groups.
@@ -282,6 +313,9 @@ impl PlaneTerrain {
             let value = options.far.to_string();
             return Err(fault("terrain.far", value, "in [100, 4e6] m on the plane"));
         }
+        // Finer texels than the preset's take more steps.
+        let finer = (f64::from(texels) / number("CLIP_TEXELS", 512.0)).max(1.0);
+        let steps = (finer * number("CLIP_STEPS", 500.0)).round();
         let clipmap = Clipmap::new(
             device,
             programs,
@@ -290,13 +324,14 @@ impl PlaneTerrain {
                 texels,
                 levels: 16,
                 reach: options.far,
+                width: number("CLIP_WIDTH", 4.0) as u32,
             },
             true,
         )?;
         let constants = [
             ("FIELD_KIND", f64::from(options.land.field.kind.number())),
             ("OUTPUT", output),
-            ("CLIP_STEPS", number("CLIP_STEPS", 500.0)),
+            ("CLIP_STEPS", steps),
             ("REFINE_STEPS", number("REFINE_STEPS", 2.0)),
             ("SEARCH_STEPS", number("SEARCH_STEPS", 48.0)),
             ("ROCK_CHEAP", number("TEXTURE_LOW_QUALITY", 0.0)),
@@ -375,6 +410,7 @@ impl PlaneTerrain {
             shade,
             searched: number("SEARCH_STEPS", 48.0) > 0.0,
             seen: true,
+            looked: None,
         })
     }
 
@@ -459,10 +495,23 @@ impl PlaneTerrain {
         let eye = view.eye.normalized();
         let field = self.clipmap.field().clone();
         // A level finer than a pixel on the nearest ground would not be used.
-        let nearest = nearest_ground(&field, eye);
         let far = self.far.min(self.clipmap.reach());
-        let azimuths = azimuths([middle, right, up]);
-        let shown = nearest_in_view(&field, eye, [middle, right, up], azimuths, [nearest, far]);
+        let rays = [middle, right, up];
+        let azimuths = azimuths(rays);
+        let (nearest, shown) = match self.looked.as_ref().and_then(|l| l.from_near(eye, rays)) {
+            Some(known) => known,
+            None => {
+                let nearest = nearest_ground(&field, eye);
+                let shown = nearest_in_view(&field, eye, rays, azimuths, [nearest, far]);
+                self.looked = Some(Looked {
+                    eye,
+                    rays,
+                    nearest,
+                    shown,
+                });
+                (nearest, shown)
+            }
+        };
         // One that serves no place in view would not be used either. Texels stay small beside the distance to the ground all around, which must not come up to the eye.
         let pixel = f64::from(pixel_angle);
         let unused = shown.map_or(far, |[along, distance]| {
@@ -624,6 +673,29 @@ mod tests {
         assert!(away > 10, "{away} of 75");
         // Places nearer along the ground than what is said through the air: only there the second bound says more than the first.
         assert!(through_the_air > 1000, "{through_the_air}");
+    }
+
+    #[test]
+    fn ground_is_looked_for_anew_once_the_eye_has_moved_or_turned() {
+        let eye = WorldPos::from_metres(glam::DVec3::new(5e6, 700.0, -3e5));
+        let rays = [Vec3::NEG_Z, 0.9 * Vec3::X, 0.5 * Vec3::Y];
+        let looked = Looked {
+            eye,
+            rays,
+            nearest: 100.0,
+            shown: Some([150.0, 180.0]),
+        };
+        let moved = |metres: f64| eye.moved_by(glam::DVec3::X * metres);
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-3;
+        let (nearest, shown) = looked.from_near(moved(4.0), rays).unwrap();
+        assert!(near(nearest, 96.0), "{nearest}");
+        assert!(shown.is_some_and(|[a, t]| near(a, 146.0) && near(t, 176.0)));
+        assert!(looked.from_near(moved(-5.5), rays).is_none());
+        let turned = |by: f32| rays.map(|v| glam::Mat3::from_rotation_y(by) * v);
+        assert!(looked.from_near(eye, turned(0.005)).is_some());
+        assert!(looked.from_near(eye, turned(0.06)).is_none());
+        let farther = [rays[0], 0.5 * rays[1], 0.5 * rays[2]];
+        assert!(looked.from_near(eye, farther).is_none());
     }
 
     #[test]

@@ -431,6 +431,108 @@ fn a_ball_is_drawn_where_rays_meet_it_with_their_depth() {
     assert_eq!(crate::land::drawn(&terrain, columns, rows, 0.0).2.draws, 0);
 }
 
+/// Lit pixels of a low sun with hardly a lit one around them: most of the ground there sees the sun, by small steps in double precision over the field with the same footprint. The others lie behind
+/// crests that the steps of shadows pass.
+#[test]
+fn lone_lit_places_on_the_moon_see_the_sun() {
+    use veduta::glam::{DVec3, Vec3};
+    use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
+    let land = Land::named("luna").unwrap();
+    let globe = land.globe::<f64>().unwrap();
+    let top = land.field.bounds().unwrap().maximum;
+    let (rows, columns) = (72, 128);
+    let targets = veduta::Targets {
+        color_format: wgpu::TextureFormat::Rgba32Float,
+        depth_format: Some(wgpu::TextureFormat::Depth32Float),
+        ..Default::default()
+    };
+    let options = TerrainOptions {
+        land: land.clone(),
+        far: 1e9,
+        ..Default::default()
+    };
+    let gpu = gpu();
+    let mut terrain = Terrain::new(&gpu.device, veduta::programs(), &targets, &options).unwrap();
+    let lights = TerrainLights {
+        sun: Vec3::ONE,
+        sky: Vec3::ZERO,
+        bounce: Vec3::ZERO,
+    };
+    // Of lone pixels, of lit ones among others, and of dark ones.
+    let mut seen = [[0_usize; 2]; 3];
+    for azimuth in [0.4, 2.0, 3.6, 5.2] {
+        let (rays, angle, mut view) = rays(&globe, rows, 10e3, -10.0, 60.0);
+        let up = DVec3::from(globe.place(view.eye).up);
+        let (east, _) = up.any_orthonormal_pair();
+        let level = east * f64::cos(azimuth) + up.cross(east) * f64::sin(azimuth);
+        let radius = f64::from(view.sun.angular_radius);
+        let sun = |height: f64| up * height.sin() + level * height.cos();
+        let height = 4_f64.to_radians();
+        view.sun.to_light = sun(height).as_vec3();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let _ = terrain
+            .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+            .unwrap();
+        gpu.queue.submit([encoder.finish()]);
+        let (picture, depths, _) = crate::land::drawn(&terrain, columns, rows, 0.0);
+        let forward = view
+            .world_from_view
+            .transform_vector3(Vec3::NEG_Z)
+            .as_dvec3();
+        let lit = |x: usize, y: usize| picture[4 * (y * columns + x)] > 0.004;
+        for y in 1..rows - 1 {
+            for x in 1..columns - 1 {
+                let i = y * columns + x;
+                if depths[i] <= 0.0 {
+                    continue;
+                }
+                let around = (0..9)
+                    .filter(|k| *k != 4 && lit(x + k % 3 - 1, y + k / 3 - 1))
+                    .count();
+                let kind = match (lit(x, y), around) {
+                    (true, 0..=1) => 0,
+                    (true, _) if i % 16 == 0 => 1,
+                    (false, _) if i % 16 == 0 => 2,
+                    _ => continue,
+                };
+                let distance = 0.1 / f64::from(depths[i]) / forward.dot(rays[i].dir.into());
+                let at = view.eye.moved_by(DVec3::from(rays[i].dir) * distance);
+                let footprint = f64::from(angle) * distance;
+                let here = globe.place(at);
+                let normal = DVec3::from(globe.normal(here, &globe.ground_at(here, footprint)));
+                if kind == 2 && normal.dot(sun(height)) < 0.1 {
+                    continue;
+                }
+                // The upper limb shows above all ground.
+                let dir = sun(height + radius);
+                let mut t = 1.5 * footprint;
+                let sees = loop {
+                    let p = at.moved_by(dir * t);
+                    let (place, altitude) = (globe.place(p), globe.altitude(p));
+                    if altitude > top {
+                        break true;
+                    }
+                    if altitude < globe.ground_at(place, footprint).height {
+                        break false;
+                    }
+                    t += 0.25 * footprint;
+                };
+                seen[kind][usize::from(sees)] += 1;
+            }
+        }
+    }
+    println!(
+        "in the dark and with the sun in sight: alone {:?}, lit {:?}, dark {:?}",
+        seen[0], seen[1], seen[2]
+    );
+    let share = |k: usize| seen[k][1] as f64 / (seen[k][0] + seen[k][1]) as f64;
+    assert!(seen.iter().all(|s| s[0] + s[1] > 20), "{seen:?}");
+    assert!(
+        share(0) > 0.7 && share(1) > 0.95 && share(2) < 0.5,
+        "{seen:?}"
+    );
+}
+
 #[test]
 fn faults_on_a_ball_name_what_is_wrong() {
     let good = Land::named("luna").unwrap();

@@ -428,8 +428,8 @@ fn row_l38_every_quality_key_acts_where_it_should() {
     for key in programs().keys.iter() {
         // A scene turns these on, and the target's format decides on the last.
         let elsewhere = ["TERRAIN", "ATMOSPHERE", "CLOUDS", "OUTPUT"];
-        // Sizes of the sky's tables and of the terrain's levels, which no program names.
-        let size = key.name == "CLIP_TEXELS"
+        // Sizes of the sky's tables and of the terrain's levels and sectors, which no program names.
+        let size = ["CLIP_TEXELS", "CLIP_WIDTH"].contains(&key.name.as_ref())
             || ["COLUMNS_", "DIFFUSE_", "SKY_", "AERIAL_"]
                 .iter()
                 .any(|table| key.name.starts_with(table))

@@ -150,7 +150,8 @@ fn resolve(@builtin(position) position: vec4<f32>) -> Joined {
     if TEMPORAL_SPARSE != 0 {
         let away = abs(off - right_one) * scale;
         now = textureLoad(picture, clamp(vec2<i32>(first + right_one), vec2<i32>(0), last), 0);
-        weight = max(pixel_share(away.x) * pixel_share(away.y), 1e-7);
+        // Few samples fall into a pixel then: those around it count, too.
+        weight = max(pixel_share(0.7 * away.x) * pixel_share(0.7 * away.y), 1e-7);
     } else {
         let across = vec2<f32>(pixel_share(off.x * scale.x), pixel_share((1.0 - off.x) * scale.x)) + 1e-4 * vec2<f32>(1.0 - off.x, off.x);
         let along = vec2<f32>(pixel_share(off.y * scale.y), pixel_share((1.0 - off.y) * scale.y)) + 1e-4 * vec2<f32>(1.0 - off.y, off.y);
@@ -168,14 +169,25 @@ fn resolve(@builtin(position) position: vec4<f32>) -> Joined {
     let sample = 1.0 / taken;
     let corner_one = first * sample;
     let corner_two = corner_one + 2.0 * sample;
-    let d0 = textureGather(depths, nearest, corner_one);
-    let d1 = textureGather(depths, nearest, vec2<f32>(corner_two.x, corner_one.y));
-    let d2 = textureGather(depths, nearest, vec2<f32>(corner_one.x, corner_two.y));
-    let d3 = textureGather(depths, nearest, corner_two);
-    // The four around; gathers give (0, 1), (1, 1), (1, 0), (0, 0).
-    let inverse = (vec4<f32>(d2.z, d3.w, d1.x, d0.y) + temporal.depth_offset) * temporal.inverse_numerator;
-    let most_depth = most_of(max(max(d0, d1), max(d2, d3)));
-    let least_depth = least_of(min(min(d0, d1), min(d2, d3)));
+    var inverse = vec4<f32>(0.0);
+    var most_depth = 0.0;
+    var least_depth = 0.0;
+    // Samples that are far apart do not tell of what is finer for an eye that moves; it is left to the four around.
+    if TEMPORAL_SPARSE != 0 && TEMPORAL_STILL == 0 {
+        inverse = textureGather(depths, nearest, corner_one + sample);
+        most_depth = most_of(inverse);
+        least_depth = least_of(inverse);
+    } else {
+        let d0 = textureGather(depths, nearest, corner_one);
+        let d1 = textureGather(depths, nearest, vec2<f32>(corner_two.x, corner_one.y));
+        let d2 = textureGather(depths, nearest, vec2<f32>(corner_one.x, corner_two.y));
+        let d3 = textureGather(depths, nearest, corner_two);
+        // The four around; gathers give (0, 1), (1, 1), (1, 0), (0, 0).
+        inverse = vec4<f32>(d2.z, d3.w, d1.x, d0.y);
+        most_depth = most_of(max(max(d0, d1), max(d2, d3)));
+        least_depth = least_of(min(min(d0, d1), min(d2, d3)));
+    }
+    inverse = (inverse + temporal.depth_offset) * temporal.inverse_numerator;
     // Depths may grow with the distance.
     let ends = (vec2<f32>(least_depth, most_depth) + temporal.depth_offset) * temporal.inverse_numerator;
     let near = max(ends.x, ends.y);

@@ -87,10 +87,13 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
     let by_radian = f32(clip.sectors) * 0.15915494309;
     let first = select(i32(floor((azimuth + left - 1e-3) * by_radian)), clip.first_sector, wide);
     let last = select(i32(floor((azimuth + right + 1e-3) * by_radian)), clip.first_sector + clip.made_sectors - 1, wide);
-    let whole = i32(textureDimensions(sectors).x) - 1;
+    // Of 64 rings each.
+    let blocks = clip.rings + (clip.rings >> 3u);
     var skyline = -1e30;
     for (var j = first; j <= last; j++) {
-        skyline = max(skyline, textureLoad(sectors, vec2<i32>(whole, j & (clip.sectors - 1)), 0).x);
+        for (var k = 0; k < (clip.rings >> 6u); k++) {
+            skyline = max(skyline, textureLoad(sectors, vec2<i32>(blocks + k, j & (clip.sectors - 1)), 0).x);
+        }
     }
     let bend = select(max(cos(right - left), 0.3), 1.0, wide);
     var bottom = 2.0;

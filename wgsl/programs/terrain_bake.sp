@@ -4,11 +4,8 @@ Heights of a rectangle of one level of a clipmap; how high the ground stands aro
 
 #COMPUTE{
     #CODE{
-// Texels of a side of the squares of which the greatest heights are kept, and the binary logarithm of it.
-const PEAK: i32 = 2;
-const PEAK_SHIFT: u32 = 1u;
 #ifdef CLIP_SECTORS
-// The tangents that clear the ground of each ring of a sector; behind them the maxima of 8 and of 64 rings, and that of all.
+// The tangents that clear the ground of each ring of a sector; behind them the maxima of 8 and of 64 rings.
 #import veduta::terrain::clipmap::{Clip, level_of, ring_radius, clearing_tangent}
 
 @group(0) @binding(0) var<uniform> clip: Clip;
@@ -20,10 +17,11 @@ const PEAK_SHIFT: u32 = 1u;
 
 var<workgroup> found: array<f32, 64>;
 
-// One invocation eight rings.
-@compute @workgroup_size(64)
-fn sweep(@builtin(local_invocation_index) index: u32, @builtin(workgroup_id) group: vec3<u32>) {
-    let sector = (clip.first_sector + i32(group.x)) & (clip.sectors - 1);
+// Eight sectors by eight rings, of which one invocation goes through eight: 64 rings. Neighbouring invocations have neighbouring sectors, which cost the same.
+@compute @workgroup_size(8, 8)
+fn sweep(@builtin(local_invocation_id) local: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>) {
+    let number = i32(group.x * 8u + local.x);
+    let sector = (clip.first_sector + number) & (clip.sectors - 1);
     let width = 6.28318530718 / f32(clip.sectors);
     // A little more than the sector, for the rounding of azimuths.
     let turn = vec2<f32>(f32(sector) - 0.001, f32(sector) + 1.001) * width;
@@ -31,60 +29,51 @@ fn sweep(@builtin(local_invocation_index) index: u32, @builtin(workgroup_id) gro
     let b = vec2<f32>(cos(turn.y), sin(turn.y));
     // How far the sector's directions reach along their longer axis: least and most at its borders, since 45 and 90 degrees are borders, or nearly.
     let along = vec2<f32>(max(abs(a.x), abs(a.y)), max(abs(b.x), abs(b.y)));
-    let rounds = (clip.rings + 511) / 512;
-    let squares = clip.texels / PEAK;
-    var whole = -1e30;
-    for (var round = 0; round < rounds; round++) {
-        let begin = (round * 64 + i32(index)) * 8;
-        var eight = -1e30;
-        for (var ring = begin; ring < min(begin + 8, clip.rings); ring++) {
-            let near = ring_radius(clip, ring) * 0.9999;
-            let far = ring_radius(clip, ring + 1) * 1.0001;
-            // Lines through corners this far out do not cut the arc.
-            let out = far * 1.0002;
-            let first = level_of(clip, vec2<f32>(near * min(along.x, along.y) * 0.9998));
-            let last = min(level_of(clip, vec2<f32>(out * max(along.x, along.y))), clip.levels - 1);
-            let low = min(min(a, b) * near, min(a, b) * out);
-            let high = max(max(a, b) * near, max(a, b) * out);
-            var top = -1e30;
-            for (var level = first; level <= last; level++) {
-                let place = textureLoad(places, vec2<i32>(level, 0), 0);
-                // The part of the ring that this level serves.
-                let edge = vec2<f32>((clip.reach + 1.0) * place.w);
-                let corner = vec2<i32>(floor(place.xy + max(low, -edge) * place.z)) >> vec2<u32>(PEAK_SHIFT);
-                let count = ((vec2<i32>(floor(place.xy + min(high, edge) * place.z)) + 1) >> vec2<u32>(PEAK_SHIFT)) - corner + 1;
-                for (var z = 0; z < count.y; z += 2) {
-                    for (var x = 0; x < count.x; x += 2) {
-                        let middle = vec2<f32>(((corner + vec2<i32>(x, z)) & vec2<i32>(squares - 1)) + 1) / f32(squares);
-                        let h = textureGather(0, peaks, wrapping, middle, level);
-                        top = max(top, max(max(h.x, h.y), max(h.z, h.w)) + clip.margin * place.w);
-                    }
+    let squares = i32(textureDimensions(peaks).x);
+    let shift = vec2<u32>(firstTrailingBit(u32(clip.texels / squares)));
+    let begin = i32(group.y) * 64 + i32(local.y) * 8;
+    let count_of_rings = select(0, 8, number < clip.made_sectors);
+    var eight = -1e30;
+    var near = ring_radius(clip, begin);
+    for (var ring = begin; ring < begin + count_of_rings; ring++) {
+        let inner = near * 0.9999;
+        near = ring_radius(clip, ring + 1);
+        let far = near * 1.0001;
+        // Lines through corners this far out do not cut the arc.
+        let out = far * 1.0002;
+        let first = level_of(clip, vec2<f32>(inner * min(along.x, along.y) * 0.9998));
+        let last = min(level_of(clip, vec2<f32>(out * max(along.x, along.y))), clip.levels - 1);
+        let low = min(min(a, b) * inner, min(a, b) * out);
+        let high = max(max(a, b) * inner, max(a, b) * out);
+        var top = -1e30;
+        for (var level = first; level <= last; level++) {
+            let place = textureLoad(places, vec2<i32>(level, 0), 0);
+            // The part of the ring that this level serves.
+            let edge = vec2<f32>((clip.reach + 1.0) * place.w);
+            let corner = vec2<i32>(floor(place.xy + max(low, -edge) * place.z)) >> shift;
+            let count = ((vec2<i32>(floor(place.xy + min(high, edge) * place.z)) + 1) >> shift) - corner + 1;
+            for (var z = 0; z < count.y; z += 2) {
+                for (var x = 0; x < count.x; x += 2) {
+                    let middle = vec2<f32>(((corner + vec2<i32>(x, z)) & vec2<i32>(squares - 1)) + 1) / f32(squares);
+                    let h = textureGather(0, peaks, wrapping, middle, level);
+                    top = max(top, max(max(h.x, h.y), max(h.z, h.w)) + clip.margin * place.w);
                 }
             }
-            let tangent = select(clearing_tangent(clip.ground_radius, clip.eye_altitude, top, near, far), -1e30, top < -1e29);
-            textureStore(sectors, vec2<i32>(ring, sector), vec4<f32>(tangent, 0.0, 0.0, 0.0));
-            eight = max(eight, tangent);
         }
-        if begin < clip.rings {
-            textureStore(sectors, vec2<i32>(clip.rings + begin / 8, sector), vec4<f32>(eight, 0.0, 0.0, 0.0));
-        }
-        workgroupBarrier();
-        found[index] = eight;
-        workgroupBarrier();
-        if (index & 7u) == 0u && begin < clip.rings {
+        let tangent = select(clearing_tangent(clip.ground_radius, clip.eye_altitude, top, inner, far), -1e30, top < -1e29);
+        textureStore(sectors, vec2<i32>(ring, sector), vec4<f32>(tangent, 0.0, 0.0, 0.0));
+        eight = max(eight, tangent);
+    }
+    found[local.y * 8u + local.x] = eight;
+    workgroupBarrier();
+    if count_of_rings > 0 {
+        textureStore(sectors, vec2<i32>(clip.rings + begin / 8, sector), vec4<f32>(eight, 0.0, 0.0, 0.0));
+        if local.y == 0u {
             for (var k = 1u; k < 8u; k++) {
-                eight = max(eight, found[index + k]);
+                eight = max(eight, found[k * 8u + local.x]);
             }
             textureStore(sectors, vec2<i32>(clip.rings + clip.rings / 8 + begin / 64, sector), vec4<f32>(eight, 0.0, 0.0, 0.0));
         }
-        if index == 0u {
-            for (var k = 0u; k < 64u; k++) {
-                whole = max(whole, found[k]);
-            }
-        }
-    }
-    if index == 0u {
-        textureStore(sectors, vec2<i32>(i32(textureDimensions(sectors).x) - 1, sector), vec4<f32>(whole, 0.0, 0.0, 0.0));
     }
 }
 #else
@@ -181,19 +170,21 @@ struct Rectangle {
 // One invocation a square of texels; rectangles hold whole ones.
 @compute @workgroup_size(8, 8)
 fn bake(@builtin(global_invocation_id) id: vec3<u32>) {
-    let first = vec2<i32>(id.xy) * PEAK;
+    let peak = rectangle.texels / i32(textureDimensions(peaks).x);
+    let shift = firstTrailingBit(u32(peak));
+    let first = vec2<i32>(id.xy) * peak;
     if any(first >= rectangle.size) {
         return;
     }
     let mask = vec2<i32>(rectangle.texels - 1);
     var top = -1e30;
-    for (var k = 0; k < PEAK * PEAK; k++) {
-        let at = first + vec2<i32>(k & (PEAK - 1), k >> PEAK_SHIFT);
+    for (var k = 0; k < peak * peak; k++) {
+        let at = first + vec2<i32>(k & (peak - 1), k >> shift);
         let height = land_at(relief, rectangle.field, FIELD_KIND, vec2<f32>(at) * rectangle.spacing, rectangle.spacing).height;
         top = max(top, height);
         textureStore(heights, (rectangle.corner + at) & mask, rectangle.level, vec4<f32>(height, 0.0, 0.0, 0.0));
     }
-    textureStore(peaks, ((rectangle.corner + first) & mask) >> vec2<u32>(PEAK_SHIFT), rectangle.level, vec4<f32>(top, 0.0, 0.0, 0.0));
+    textureStore(peaks, ((rectangle.corner + first) & mask) >> vec2<u32>(shift), rectangle.level, vec4<f32>(top, 0.0, 0.0, 0.0));
 }
 #endif
 #endif

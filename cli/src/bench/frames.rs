@@ -7,7 +7,7 @@ use veduta::temporal::{Temporal, TemporalOptions};
 use veduta::terrain::{Land, Terrain, TerrainLights, TerrainOptions};
 use veduta::{Preset, Targets, Value, View, wgpu};
 
-use super::terrain::{part, taken};
+use super::terrain::fewer;
 use super::timing::{Middle, Ratio};
 use super::{Bench, decibels, table};
 use crate::commands::render::Job;
@@ -52,6 +52,16 @@ pub const PIECES: [&str; 6] = [
     "joining",
     "tone map",
 ];
+
+/// What of the pixels a side a preset draws before frames are joined, as it is written.
+fn part(preset: &str) -> &'static str {
+    if preset == "low" { "2/5" } else { "1/2" }
+}
+
+/// The picture that a preset draws for one of this size.
+fn taken(preset: &str, size: Size) -> Size {
+    fewer(size, if preset == "low" { 2.5 } else { 2.0 })
+}
 
 /// Of one preset on one view.
 #[derive(Debug, Clone, PartialEq)]

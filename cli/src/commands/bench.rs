@@ -72,6 +72,9 @@ pub struct BenchArgs {
     /// Of the terrain only where rays hit, and what a draw takes
     #[arg(long)]
     pub hits: bool,
+    /// Of the terrain only what frames cost, standing and flying and by their parts, and how sharp they are
+    #[arg(long, conflicts_with = "hits")]
+    pub costs: bool,
     /// Seconds of the flight of chapter 6 [default: 60]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     pub seconds: Option<u32>,
@@ -135,6 +138,9 @@ impl BenchArgs {
         }
         if self.hits {
             line += " --hits";
+        }
+        if self.costs {
+            line += " --costs";
         }
         for set in &self.sets {
             line += &format!(" --set {set}");
@@ -216,12 +222,18 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
         (
             "--of",
             as_given(&args.of),
-            others(&[Subject::Presets]),
-            "left out, or the subject `presets`",
+            others(&[Subject::Presets]) && !(args.costs && subject == Subject::Terrain),
+            "left out, or the subject `presets`, or `terrain` with --costs",
         ),
         (
             "--hits",
             args.hits.then(|| "given".to_owned()),
+            others(&[Subject::Terrain]),
+            "left out, or the subject `terrain`",
+        ),
+        (
+            "--costs",
+            args.costs.then(|| "given".to_owned()),
             others(&[Subject::Terrain]),
             "left out, or the subject `terrain`",
         ),
@@ -370,8 +382,12 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 rounds: rounds.least,
                 frames: if args.views.is_empty() { 60 } else { 0 },
             };
-            if args.hits {
-                let text = terrain::hits(&bench, &plan, &mut progress)?;
+            if args.hits || args.costs {
+                let text = if args.hits {
+                    terrain::hits(&bench, &plan, &mut progress)?
+                } else {
+                    terrain::costs(&bench, &plan, &args.of, &mut progress)?
+                };
                 bar.finish_and_clear();
                 print!("{text}");
                 return match &args.out {
