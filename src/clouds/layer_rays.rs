@@ -41,10 +41,10 @@ impl Default for LayerOptions {
 ///
 /// Light of all orders is that of a layer over a plane that repeats, without the planet's curvature, swept over cells as in [`super::cube_light`]; what light
 /// from above and from below shows of itself behind the clouds is not counted. The sun's depths are those of a sun that is at least as high as
-/// [`super::LOWEST_SUN`]; where it is lower, rays of single scattering are marched on both paths.
+/// [`super::LOWEST_SUN`]; where it is lower, and for layers of a long period ([`CloudDeck::is_windowed`]), rays of single scattering are marched on both paths.
 ///
 /// # Errors
-/// As [`CloudDeck::check`]; [`Error::OutOfDomain`] for options; the faults of making pipelines; [`Error::Device`].
+/// As [`CloudDeck::check`]; [`Error::OutOfDomain`] for options, and for all orders in a layer of a long period; the faults of making pipelines; [`Error::Device`].
 pub fn layer_light(
     gpu: &Gpu,
     programs: &ProgramSet,
@@ -91,6 +91,7 @@ pub fn layer_light(
         }
     }
     if all {
+        check_period(deck)?;
         let textbook = path == ProbePath::Textbook;
         let shortest = deck.thickness / if textbook { 256.0 } else { 64.0 };
         let solver = LayerOrders::new(gpu, programs, deck, 64, shortest)?;
@@ -115,7 +116,7 @@ pub fn layer_light(
     let (mut marched, mut baked) = (None, None);
     for (to_sun, members) in &groups {
         let sun = to_sun.map(|c| c as f32);
-        let fast = path == ProbePath::Fast && sun[1] >= LOWEST_SUN;
+        let fast = path == ProbePath::Fast && sun[1] >= LOWEST_SUN && !deck.is_windowed();
         let rows: Vec<[f32; 5]> = members
             .iter()
             .map(|i| {
@@ -147,7 +148,7 @@ pub fn layer_light(
 /// below [`super::LOWEST_SUN`] taken to be that high. What the clouds scatter down is not counted. Submits and waits.
 ///
 /// # Errors
-/// As [`CloudDeck::check`]; [`Error::OutOfDomain`] for points that are not finite; the faults of making pipelines; [`Error::Device`].
+/// As [`CloudDeck::check`]; [`Error::OutOfDomain`] for points that are not finite and for layers of a long period ([`CloudDeck::is_windowed`]); the faults of making pipelines; [`Error::Device`].
 pub fn layer_shadow(
     gpu: &Gpu,
     programs: &ProgramSet,
@@ -156,6 +157,7 @@ pub fn layer_shadow(
     points: &[[f64; 3]],
 ) -> Result<Vec<f32>, Error> {
     deck.check()?;
+    check_period(deck)?;
     for (number, point) in points.iter().enumerate() {
         if point.iter().any(|c| !c.is_finite()) {
             let value = format!("{point:?}");
@@ -176,6 +178,19 @@ pub fn layer_shadow(
     let query = Query::new(gpu, programs, deck, Kind::Shadow)?;
     let found = query.ask(to_sun.map(|c| c as f32), &rows)?;
     Ok(found.into_iter().map(|l| l.transmittance).collect())
+}
+
+/// A tile over a long period would have no texels for its clouds.
+fn check_period(deck: &CloudDeck) -> Result<(), Error> {
+    if deck.is_windowed() {
+        let domain = "at most 4 for a query that bakes a tile of the whole period";
+        return Err(fault(
+            "deck.period_doublings",
+            deck.period_doublings,
+            domain,
+        ));
+    }
+    Ok(())
 }
 
 /// What the program is asked for.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::order_table::{OrderTable, Source, check_cells};
-use super::tile::{CLEAR, Tile, clear_tile, slant};
+use super::tile::{CLEAR, Tile, ahead_of, clear_tile, slant};
 use super::window::{WindowQuality, Windows};
 use super::{AirLights, CloudDeck, Orders, fault};
 use crate::atmosphere::{Atmosphere, SkyTables};
@@ -244,6 +244,8 @@ pub struct Clouds {
     shown: Option<(usize, Vec3)>,
     /// The sun that the other tile is being baked for, and how many parts it has.
     coming: Option<(Vec3, u32)>,
+    /// Share of a part of it that the frames so far have left.
+    owed: f64,
     /// The sun of the last frame.
     last_sun: Option<Vec3>,
     /// Whether the first tile was baked in this frame.
@@ -579,6 +581,7 @@ impl Clouds {
             groups: Vec::new(),
             shown: None,
             coming: None,
+            owed: 0.0,
             last_sun: None,
             fresh: false,
             placed: None,
@@ -942,6 +945,9 @@ impl Clouds {
         let mut work = Work::default();
         if self.deck.is_empty() || !(self.seen || self.shadows) {
             // The way of the sun meanwhile is not that of a frame.
+            if let Some(windows) = &mut self.windows {
+                windows.forget_step();
+            }
             self.last_sun = None;
             return Ok(work);
         }
@@ -1100,6 +1106,8 @@ impl Clouds {
         if self.shown.is_none() {
             self.coming = None;
         }
+        // What is being baked for a sun that has not come.
+        self.coming = self.coming.filter(|c| (to_sun - c.0).length() < 0.17);
         let Some((shown, baked_for)) = self.shown else {
             for part in 0..self.tile.parts(0) {
                 add(
@@ -1124,15 +1132,18 @@ impl Clouds {
                 return;
             }
             // The new tile is shown for as long as the one after it takes: it is baked for the middle of that time.
-            let share = self.share(other, to_sun);
-            let taken = self.tile.parts(other).div_ceil(share);
-            let ahead = to_sun + step * (1.5 * taken as f32);
-            let ahead = if step.length() < 0.02 { ahead } else { to_sun };
-            self.coming = Some((ahead.normalize_or(to_sun), 0));
+            let taken = self.frames_of(to_sun) as f32;
+            self.coming = Some((ahead_of(to_sun, step, 1.5 * taken), 0));
+            self.owed = 0.0;
             work.bakes += 1;
         }
-        let share = self.share(other, self.coming.map_or(to_sun, |c| c.0));
         let parts = self.tile.parts(other);
+        let frames = self.frames_of(self.coming.map_or(to_sun, |c| c.0));
+        self.owed += f64::from(parts) / frames;
+        // By a hair more than whole, so that sums that should be whole are.
+        let share = (self.owed + 1e-6).floor();
+        self.owed -= share;
+        let share = share as u32;
         if let Some((sun, done)) = &mut self.coming {
             for part in *done..(*done + share).min(parts) {
                 add(
@@ -1149,11 +1160,9 @@ impl Clouds {
         }
     }
 
-    /// Parts of a tile that a frame bakes; the fewer the dearer they are for a low sun.
-    fn share(&self, tile: usize, to_sun: Vec3) -> u32 {
-        let cost = self.tile.cost(&self.deck, to_sun.to_array());
-        let frames = f64::from(self.quality.frames) * cost;
-        (f64::from(self.tile.parts(tile)) / frames).ceil().max(1.0) as u32
+    /// Frames that a tile takes: the more, the dearer it is for a low sun.
+    fn frames_of(&self, to_sun: Vec3) -> f64 {
+        f64::from(self.quality.frames) * self.tile.cost(&self.deck, to_sun.to_array())
     }
 
     /// Whether a ray of the picture can meet the layer.

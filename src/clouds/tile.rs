@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use glam::Vec3;
+
 use super::{CloudDeck, WeatherTexels};
 use crate::error::Error;
 use crate::exchange::compute;
@@ -108,6 +110,11 @@ pub(super) struct Slant {
     length: f32,
     /// Whether the sun is so low that columns stand upright.
     low: bool,
+}
+
+/// Where a sun will be in so many frames if it goes on by `step` a frame, at most 4.6 degrees on: it may stop.
+pub(super) fn ahead_of(to_sun: Vec3, step: Vec3, frames: f32) -> Vec3 {
+    (to_sun + (frames * step).clamp_length_max(0.08)).normalize_or(to_sun)
 }
 
 /// For a sun, where columns follow its rays down to `lowest`, a sine.

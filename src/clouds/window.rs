@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::order_table::Source;
+use super::tile::ahead_of;
 use super::{CloudDeck, CloudQuality, fault};
 use crate::error::Error;
 use crate::exchange::compute;
@@ -45,9 +46,11 @@ pub struct WindowQuality {
     pub texels: u32,
     /// Levels of each window, in [2, 128].
     pub levels: u32,
-    /// Texels of the finest window for each wavelength of the layer, at least, in [1, 1024]. There are as many windows as it takes from there to
-    /// [`CloudsOptions::far`](super::CloudsOptions::far), each with texels twice as wide, but at most seven: rays end with the widest.
+    /// Texels of the finest window for each wavelength of the layer, in [1, 1024], while `most` is not reached. There are as many windows as it takes from there to
+    /// [`CloudsOptions::far`](super::CloudsOptions::far), each with texels twice as wide; rays end with the widest, which is at most as wide as a seventh of such windows.
     pub fineness: u32,
+    /// Windows at most, in [1, 7]: where more would be needed texels are wider instead.
+    pub most: u32,
 }
 
 impl WindowQuality {
@@ -62,6 +65,7 @@ impl WindowQuality {
             texels,
             levels,
             fineness,
+            most: 4,
         }
     }
 
@@ -73,6 +77,7 @@ impl WindowQuality {
         for (name, value, low, high) in [
             ("levels", self.levels, 2, 128),
             ("fineness", self.fineness, 1, 1024),
+            ("most", self.most, 1, MOST),
         ] {
             if !(low..=high).contains(&value) {
                 let domain = format!("in [{low}, {high}]");
@@ -171,6 +176,7 @@ fn sizes(deck: &CloudDeck, quality: &WindowQuality, far: f64) -> (u32, u64) {
         texels,
         levels,
         fineness,
+        most,
     } = *quality;
     let rise = f64::from(deck.lowest_window_sun(levels));
     let across = 0.5 * deck.thickness * (1.0 / (rise * rise) - 1.0).max(0.0).sqrt();
@@ -178,7 +184,7 @@ fn sizes(deck: &CloudDeck, quality: &WindowQuality, far: f64) -> (u32, u64) {
     let finest = f64::from(texels) * deck.wavelength / f64::from(fineness);
     let widest = (2.0 * (far + across) / held).min(finest * f64::from(1_u32 << (MOST - 1)));
     let doublings = (widest / finest).log2().ceil();
-    let count = doublings.clamp(0.0, f64::from(MOST - 1)) as u32 + 1;
+    let count = doublings.clamp(0.0, f64::from(most - 1)) as u32 + 1;
     let texel = widest / f64::from(1_u32 << (count - 1)) / f64::from(texels);
     let turn = (texel / deck.period() * 2.0_f64.powi(32)).round();
     (count, turn.max(1.0) as u64)
@@ -295,6 +301,11 @@ impl Windows {
             used: 0,
             budget: 0,
         })
+    }
+
+    /// Forgets how the sun went on: what it went while nothing was shown is no step.
+    pub fn forget_step(&mut self) {
+        self.last_sun = None;
     }
 
     pub fn count(&self) -> usize {
@@ -421,9 +432,13 @@ impl Windows {
         work: &mut Work,
     ) -> bool {
         let place = self.place(eye);
+        if to_sun.is_none() {
+            self.last_sun = None;
+        }
+        let day = to_sun.is_some();
         let to_sun = to_sun.or(self.sun).unwrap_or(Vec3::Y);
         let step = self.last_sun.map_or(Vec3::ZERO, |last| to_sun - last);
-        self.last_sun = Some(to_sun);
+        self.last_sun = day.then_some(to_sun);
         let columns = i64::from(self.texels) * i64::from(self.texels);
         self.used = 0;
         self.budget = (columns * self.count() as i64 / (2 * i64::from(self.frames)))
@@ -435,6 +450,10 @@ impl Windows {
             work,
         };
         let sun = self.sun.filter(|sun| (to_sun - *sun).length() < 0.17);
+        // What is being baked for a sun that has not come.
+        self.turning = self
+            .turning
+            .filter(|t| t.turned < self.windows.len() || (to_sun - t.to_sun).length() < 0.17);
         let fresh = sun.is_none();
         if fresh {
             // The first frame, or a sun that has jumped.
@@ -583,12 +602,11 @@ impl Windows {
                     return;
                 }
                 // They are shown for as long as the next round takes: baked for the middle of that time.
-                let ahead = to_sun + step * (3.0 * self.frames as f32);
-                let ahead = if step.length() < 0.01 { ahead } else { to_sun };
+                let ahead = ahead_of(to_sun, step, 3.0 * self.frames as f32);
                 let last = self.count() - 1;
                 baker.work.bakes += 1;
                 Turning {
-                    to_sun: ahead.normalize_or(to_sun),
+                    to_sun: ahead,
                     turned: self.count(),
                     corner: self.corner_about(place.over(last)),
                     rows: 0,

@@ -675,5 +675,61 @@ fn layers_appear_without_a_pop() {
         );
         assert!(worst[0] < 0.003, "{worst:?}");
         assert!(worst[1] < 0.01, "{worst:?}");
+        assert!(worst[2] < 0.05, "{worst:?}");
+    }
+}
+
+/// From columns that follow the sun's rays to upright ones, in tiles of 8 bits, while it sets.
+#[test]
+fn a_setting_sun_lights_clouds_as_one_that_stands() {
+    let mut view = View {
+        eye: WorldPos::from_metres(DVec3::new(13_500.0, 300.0, -14_700.0)),
+        ..Default::default()
+    };
+    view.sun.irradiance = Vec3::ONE;
+    view.look(0.0, 0.5, 1.0, 16.0 / 9.0);
+    let lights = CloudLights {
+        sun: Vec3::splat(std::f32::consts::PI),
+        above: Vec3::ZERO,
+        below: Vec3::ZERO,
+    };
+    let device = &gpu().device;
+    for (deck, [high, low]) in [("thesis", [9.0_f64, 4.0]), ("towers", [30.0, 24.0])] {
+        let options = CloudsOptions {
+            quality: CloudQuality {
+                frames: 10,
+                ..CloudQuality::of(&Preset::Low)
+            },
+            deck: CloudDeck::named(deck).unwrap(),
+            ..Default::default()
+        };
+        let new = || Clouds::new(device, veduta::programs(), &targets(), &options).unwrap();
+        let mut under = |clouds: &mut Clouds, degrees: f64| {
+            view.sun.to_light = direction(degrees.to_radians(), 0.5).as_vec3();
+            over_black(clouds, &view, &lights)
+        };
+        // A fifth of a degree a frame, and then it stands.
+        let mut clouds = new();
+        for k in 0..25 {
+            let _ = under(&mut clouds, high - (high - low) * f64::from(k) / 25.0);
+        }
+        let rest = |clouds: &mut Clouds,
+                    under: &mut dyn FnMut(&mut Clouds, f64) -> Vec<[f32; 4]>| {
+            (0..400).map(|_| under(clouds, low)).last().unwrap()
+        };
+        let moved = under(&mut clouds, low);
+        let (rested, begun) = (rest(&mut clouds, &mut under), rest(&mut new(), &mut under));
+        let off = |picture: &[[f32; 4]]| {
+            let part = |f: &dyn Fn(usize) -> f32| {
+                (0..begun.len())
+                    .map(|i| f64::from(f(i)).powi(2))
+                    .sum::<f64>()
+            };
+            (part(&|i| picture[i][1] - begun[i][1]) / part(&|i| begun[i][1])).sqrt()
+        };
+        let (way, stood) = (off(&moved), off(&rested));
+        println!("{deck}: {way:.3} off when the sun has just come to rest, {stood:.4} later");
+        assert!(way < 0.3, "{deck}: {way}");
+        assert!(stood < 0.02, "{deck}: {stood}");
     }
 }
