@@ -740,7 +740,7 @@ impl Windows {
         let count = self.count();
         let mut near = [0.0_f64; 8];
         let mut least = 0.0_f64;
-        for k in 0..count {
+        for (k, told) in near.iter_mut().enumerate().take(count) {
             let (size, whole) = (self.texel_size(k), self.half(k));
             let at = place.over(k);
             let window = &mut self.windows[k];
@@ -756,7 +756,7 @@ impl Windows {
                 side(0).min(side(1)).min(shown)
             };
             least = least.max(held);
-            near[k] = least;
+            *told = least;
         }
         near[count..].fill(least);
         let near = near.map(|n| n as f32);
