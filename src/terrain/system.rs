@@ -127,7 +127,7 @@ struct Looked {
 
 impl Looked {
     /// The same for an eye that has hardly moved, or turned by no more than samples are shifted in few pixels: nearer by as much as it has moved.
-    fn from_near(&self, eye: WorldPos, rays: [Vec3; 3]) -> Option<(f64, Option<[f64; 2]>)> {
+    fn seen_near(&self, eye: WorldPos, rays: [Vec3; 3]) -> Option<(f64, Option<[f64; 2]>)> {
         let moved = eye.relative_to(self.eye).length();
         let turned = (0..3).any(|k| {
             let off = (rays[k] - self.rays[k]).length();
@@ -498,7 +498,7 @@ impl PlaneTerrain {
         let far = self.far.min(self.clipmap.reach());
         let rays = [middle, right, up];
         let azimuths = azimuths(rays);
-        let (nearest, shown) = match self.looked.as_ref().and_then(|l| l.from_near(eye, rays)) {
+        let (nearest, shown) = match self.looked.as_ref().and_then(|l| l.seen_near(eye, rays)) {
             Some(known) => known,
             None => {
                 let nearest = nearest_ground(&field, eye);
@@ -687,15 +687,15 @@ mod tests {
         };
         let moved = |metres: f64| eye.moved_by(glam::DVec3::X * metres);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-3;
-        let (nearest, shown) = looked.from_near(moved(4.0), rays).unwrap();
+        let (nearest, shown) = looked.seen_near(moved(4.0), rays).unwrap();
         assert!(near(nearest, 96.0), "{nearest}");
         assert!(shown.is_some_and(|[a, t]| near(a, 146.0) && near(t, 176.0)));
-        assert!(looked.from_near(moved(-5.5), rays).is_none());
+        assert!(looked.seen_near(moved(-5.5), rays).is_none());
         let turned = |by: f32| rays.map(|v| glam::Mat3::from_rotation_y(by) * v);
-        assert!(looked.from_near(eye, turned(0.005)).is_some());
-        assert!(looked.from_near(eye, turned(0.06)).is_none());
+        assert!(looked.seen_near(eye, turned(0.005)).is_some());
+        assert!(looked.seen_near(eye, turned(0.06)).is_none());
         let farther = [rays[0], 0.5 * rays[1], 0.5 * rays[2]];
-        assert!(looked.from_near(eye, farther).is_none());
+        assert!(looked.seen_near(eye, farther).is_none());
     }
 
     #[test]

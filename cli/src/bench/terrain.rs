@@ -378,7 +378,8 @@ fn taken(preset: &str, size: Size) -> Size {
 
 /// A picture of fewer pixels a side by a factor.
 pub(super) fn fewer(size: Size, ratio: f64) -> Size {
-    let less = |n: u32| (f64::from(n) / ratio).round() as u32;
+    // Not below what `Temporal` takes.
+    let less = |n: u32| ((f64::from(n) / ratio).round() as u32).max(n.div_ceil(4));
     Size {
         width: less(size.width),
         height: less(size.height),
