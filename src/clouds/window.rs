@@ -47,9 +47,9 @@ pub struct WindowQuality {
     /// Levels of each window, in [2, 128].
     pub levels: u32,
     /// Texels of the finest window for each wavelength of the layer, in [1, 1024], while `most` is not reached. There are as many windows as it takes from there to
-    /// [`CloudsOptions::far`](super::CloudsOptions::far), each with texels twice as wide; rays end with the widest, which is at most as wide as a seventh of such windows.
+    /// [`CloudsOptions::far`](super::CloudsOptions::far), each with texels twice as wide.
     pub fineness: u32,
-    /// Windows at most, in [1, 7]: where more would be needed texels are wider instead.
+    /// Windows at most, in [1, 7]: where more would be needed texels are up to twice as wide, and then rays end with the widest.
     pub most: u32,
 }
 
@@ -65,7 +65,7 @@ impl WindowQuality {
             texels,
             levels,
             fineness,
-            most: 4,
+            most: if *preset == Preset::Low { 5 } else { 4 },
         }
     }
 
@@ -182,7 +182,8 @@ fn sizes(deck: &CloudDeck, quality: &WindowQuality, far: f64) -> (u32, u64) {
     let across = 0.5 * deck.thickness * (1.0 / (rise * rise) - 1.0).max(0.0).sqrt();
     let held = 1.0 - 2.0 * MARGIN / f64::from(texels);
     let finest = f64::from(texels) * deck.wavelength / f64::from(fineness);
-    let widest = (2.0 * (far + across) / held).min(finest * f64::from(1_u32 << (MOST - 1)));
+    // Texels are twice as wide as asked for before anything is left out.
+    let widest = (2.0 * (far + across) / held).min(finest * f64::from(1_u32 << most.min(MOST - 1)));
     let doublings = (widest / finest).log2().ceil();
     let count = doublings.clamp(0.0, f64::from(most - 1)) as u32 + 1;
     let texel = widest / f64::from(1_u32 << (count - 1)) / f64::from(texels);

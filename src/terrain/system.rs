@@ -73,7 +73,7 @@ pub struct TerrainOptions {
     /// Sectors in which the horizons around a place take light off the sky (ambient occlusion), in [0, 16]; 0 leaves all of it. Nothing comes of it over a ball.
     pub sky_sectors: u32,
     /// Texels of a side of each level of baked heights: 128, 256, 512 or 1024. A texel is about as wide as a pixel where it is used when this is 3.5 over the angle of a pixel. 0 leaves it to the
-    /// preset's CLIP_TEXELS: 512, or 256 for `low`. Where they are finer than these, rays take as many more steps. Nothing comes of it over a ball, where nothing is baked.
+    /// preset's CLIP_TEXELS, 512. Where they are finer than these, rays take as many more steps. Nothing comes of it over a ball, where nothing is baked.
     pub texels: u32,
     /// Whether a layer of clouds shades the ground, which [`Terrain::set_cloud_shadow`](super::Terrain::set_cloud_shadow) tells. Nothing comes of it over a ball.
     pub cloud_shadows: bool,
@@ -309,6 +309,10 @@ impl PlaneTerrain {
         if !matches!(texels, 128 | 256 | 512 | 1024) {
             return Err(fault(name, texels.to_string(), "128, 256, 512 or 1024"));
         }
+        let width = number("CLIP_WIDTH", 4.0);
+        if ![4.0, 8.0, 16.0].contains(&width) {
+            return Err(fault("CLIP_WIDTH", width.to_string(), "4, 8 or 16"));
+        }
         if !(100.0..=4e6).contains(&options.far) {
             let value = options.far.to_string();
             return Err(fault("terrain.far", value, "in [100, 4e6] m on the plane"));
@@ -324,7 +328,7 @@ impl PlaneTerrain {
                 texels,
                 levels: 16,
                 reach: options.far,
-                width: number("CLIP_WIDTH", 4.0) as u32,
+                width: width as u32,
             },
             true,
         )?;

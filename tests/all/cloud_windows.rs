@@ -517,6 +517,8 @@ fn what_windows_cannot_do_is_refused() {
             "windows.texels",
         ),
         (WindowQuality { levels: 1, ..good }, "windows.levels"),
+        (WindowQuality { most: 0, ..good }, "windows.most"),
+        (WindowQuality { most: 8, ..good }, "windows.most"),
         (
             WindowQuality {
                 fineness: 0,
