@@ -201,7 +201,7 @@ fn the_bench_of_the_terrain_has_its_tables() {
     assert!(said.out.contains("# What the terrain costs"));
     for head in [
         "`high` joined from 1/2 [ms]",
-        "`low` joined from 4/15 [ms]",
+        "`low` joined from 13/50 [ms]",
         "/ thesis",
         "flight [ms]",
         "baked",
