@@ -74,7 +74,7 @@ pub fn draw(size: [u32; 2], towers: &[Tower]) -> Fallible<Vec<u8>> {
     let query = SkyQuery::new(device, veduta::programs(), &options.atmosphere)?;
 
     // Where things stand: the same heights as on the device, on the processor.
-    let field = land.field.prepare::<f64>()?;
+    let field = land.prepare::<f64>()?;
     let above = |at: DVec3, rise: f64| {
         let foot = WorldPos::from_metres(DVec3::new(at.x, 0.0, at.z));
         let height = field.ground(foot, 0.0).height;

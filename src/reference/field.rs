@@ -34,6 +34,8 @@ pub struct Field {
     pub mean: [f64; 4],
     /// Series of the squared slope of what is left out.
     pub lost: [f64; 4],
+    /// Height of the sea; no ground of a land is below it.
+    pub sea: f64,
 }
 
 /// The filtered field at a place.
@@ -282,4 +284,16 @@ fn mix(field: &Field, cell: [i32; 2], frac: [f64; 2], footprint: f64) -> Ground 
     });
     let lost = 0.01 * power * power * fine[3] + bend * bend * middle[3] + coarse[3];
     scaled(field, value, lost)
+}
+
+/// Standard deviation of the heights within a footprint (m).
+pub fn height_spread(slope: [f64; 2], lost: f64, footprint: f64, left: f64, fall: f64) -> f64 {
+    let growth = 4.0 * fall * fall;
+    let share = if (growth - 1.0).abs() < 1e-2 {
+        1.0 / left.max(1.0)
+    } else {
+        (growth - 1.0) / (growth.powf(left.max(1.0)) - 1.0)
+    };
+    let square = slope[0] * slope[0] + slope[1] * slope[1];
+    footprint * (square / 12.0 + 0.18 * share * lost).sqrt()
 }

@@ -307,7 +307,7 @@ impl Clipmap {
         if !matches!(options.width, 4 | 8 | 16) {
             return Err(fault("width", options.width.to_string(), "4, 8 or 16"));
         }
-        let field = land.field.prepare::<f32>()?;
+        let field = land.prepare::<f32>()?;
         let texels = i64::from(options.texels);
         let peak = i64::from(options.width / 2);
         let block = if options.width == 4 { 32 } else { texels / 8 };
@@ -391,7 +391,7 @@ impl Clipmap {
             })
             .collect();
         // Without bounds (a program's own function) no ground is taken to be above 20 km.
-        let top = land.field.bounds().map_or(2e4, |b| b.maximum) as f32;
+        let top = field.bounds().map_or(2e4, |b| b.maximum) as f32;
         let places_view = places.create_view(&Default::default());
         let clip = buffer(device, "veduta clipmap", ClipBlock::SIZE);
         let wrapping = device.create_sampler(&wgpu::SamplerDescriptor {

@@ -111,6 +111,8 @@ pub struct Prepared<T> {
     /// Total, first, ratio, bend.
     pub(super) mean: [T; 4],
     pub(super) lost: [T; 4],
+    /// Height of the sea.
+    pub(super) sea: T,
 }
 
 impl<T: Real> Prepared<T> {
@@ -143,7 +145,20 @@ impl<T: Real> Prepared<T> {
             detail: T::of(detail),
             mean: four(&tails.mean),
             lost: four(&tails.lost),
+            sea: T::of(-1e30),
         }
+    }
+
+    /// With a sea of a level (m) over it.
+    pub(super) fn under_sea(mut self, level: f64) -> Prepared<T> {
+        self.sea = T::of(level);
+        if let Some(bounds) = self.bounds.as_deref() {
+            let mut bounds = bounds.clone();
+            bounds.minimum = bounds.minimum.max(level);
+            bounds.maximum = bounds.maximum.max(level);
+            self.bounds = Some(Arc::new(bounds));
+        }
+        self
     }
 
     /// What it is made of.
@@ -209,6 +224,11 @@ impl<T: Real> Prepared<T> {
 
     /// The field at an offset (x, z) in metres from a place, as the device has it from the eye's.
     pub fn ground_from(&self, eye: Place<T>, offset: [T; 2], footprint: T) -> Ground<T> {
+        self.ground_at(self.moved(eye, offset), footprint)
+    }
+
+    /// The place so many metres (x, z) from another.
+    pub(super) fn moved(&self, eye: Place<T>, offset: [T; 2]) -> Place<T> {
         // Whole cells are taken off before the division, by parts whose products are exact.
         let (high, low) = self.wavelength.parts();
         let whole = offset.map(|o| (o / self.wavelength).whole());
@@ -219,8 +239,7 @@ impl<T: Real> Prepared<T> {
         let place = Place::new(eye.cell, frac);
         let cell =
             std::array::from_fn(|k| place.cell[k].wrapping_add(whole[k].wide() as i64 as i32));
-        let place = Place { cell, ..place };
-        self.ground_at(place, footprint)
+        Place { cell, ..place }
     }
 
     /// The pyramid of a height map.
@@ -228,8 +247,22 @@ impl<T: Real> Prepared<T> {
         self.map.clone()
     }
 
-    /// The field at a place on its lattice.
+    /// The field at a place on its lattice, or the level sea above it where there is one.
     pub fn ground_at(&self, place: Place<T>, footprint: T) -> Ground<T> {
+        let bare = self.bare_at(place, footprint);
+        if bare.height < self.sea {
+            let none = T::of(0.0);
+            return Ground {
+                height: self.sea,
+                slope: [none; 2],
+                lost: none,
+            };
+        }
+        bare
+    }
+
+    /// The field at a place on its lattice, below the sea too.
+    pub(super) fn bare_at(&self, place: Place<T>, footprint: T) -> Ground<T> {
         if let Some(map) = &self.map {
             let detail = self.octave_sum(place, footprint);
             let map = map.ground(place, self.wavelength, footprint);

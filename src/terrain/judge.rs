@@ -48,7 +48,7 @@ pub fn hit_errors(
             domain: format!("one hit for each of {} rays, in whole rows", rays.len()),
         });
     }
-    let field = land.field.prepare::<f64>()?;
+    let field = land.prepare::<f64>()?;
     let truth: Vec<TerrainHit> = parallel_map(rays.len(), |i| {
         field.ray_hit(land.planet_radius, &rays[i], pixel_angle, 0.05)
     })

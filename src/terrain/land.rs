@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::field::{Domain, HeightField};
+use super::ground::Prepared;
+use super::real::Real;
 use crate::error::Error;
 
 fn earth() -> f64 {
@@ -84,7 +86,7 @@ impl Material {
     }
 }
 
-/// A sea on a ball: no ground is below its level.
+/// A sea: no ground is below its level. It is still, and as dull as the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sea {
@@ -106,7 +108,7 @@ pub struct Land {
     /// What it is made of.
     #[serde(default)]
     pub material: Material,
-    /// A sea; only where the domain is `Sphere`.
+    /// A sea.
     #[serde(default)]
     pub sea: Option<Sea>,
 }
@@ -164,9 +166,6 @@ impl Land {
         let Some(sea) = self.sea else {
             return Ok(());
         };
-        if !on_sphere {
-            return fault("sea", format!("{sea:?}"), "None on a Plane");
-        }
         if !(-2e4..=2e4).contains(&sea.level) {
             return fault("sea.level", sea.level.to_string(), "in [-2e4, 2e4] m");
         }
@@ -174,6 +173,29 @@ impl Land {
             Some(c) => fault("sea.albedo", c.to_string(), "in [0, 1]"),
             None => Ok(()),
         }
+    }
+
+    /// The field on the plane with the sea over it, in `f32` as the device computes it, or in `f64`.
+    ///
+    /// ```
+    /// use veduta::WorldPos;
+    /// use veduta::terrain::{HeightField, Land, Sea};
+    /// let field = HeightField { base: -3000.0, ..Default::default() };
+    /// let sea = Some(Sea { level: -1500.0, albedo: [0.02, 0.03, 0.05] });
+    /// let land = Land { field, sea, ..Default::default() }.prepare::<f64>()?;
+    /// assert!(land.ground(WorldPos::default(), 0.0).height >= -1500.0);
+    /// # Ok::<(), veduta::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Land::check`] and [`HeightField::prepare`].
+    pub fn prepare<T: Real>(&self) -> Result<Prepared<T>, Error> {
+        self.check()?;
+        let field = self.field.prepare()?;
+        Ok(match self.sea {
+            Some(sea) => field.under_sea(sea.level),
+            None => field,
+        })
     }
 
     /// The names that [`Land::named`] knows, the default first.

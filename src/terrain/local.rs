@@ -180,7 +180,10 @@ impl Prepared<f64> {
         let mut over: Option<LocalBounds> = None;
         for k in 0..PARTS * PARTS {
             let middle = [k % PARTS, k / PARTS].map(|i| (i as f64 + 0.5) * width);
-            let part = self.part(&whole, eye, middle, 0.5 * width, footprint);
+            let mut part = self.part(&whole, eye, middle, 0.5 * width, footprint);
+            // Below the sea nothing is left of them.
+            part.minimum = part.minimum.max(self.sea);
+            part.maximum = part.maximum.max(self.sea);
             over = Some(over.map_or(part, |o| LocalBounds {
                 minimum: o.minimum.min(part.minimum),
                 maximum: o.maximum.max(part.maximum),

@@ -1,10 +1,12 @@
 //! The picture of a land on the plane in `f64`, without anything that is baked: what `Terrain` is judged against.
 
+use super::ground::{Ground, Prepared};
 use super::land::Land;
 use super::rays::{TerrainRay, altitude_along};
 use super::system::TerrainLights;
 use crate::error::Error;
-use crate::reference::math::dot;
+use crate::reference::field::height_spread;
+use crate::reference::math::{dot, smoothstep};
 use crate::reference::parallel::parallel_map;
 use crate::reference::terrain::{
     Rock, ThreeLights, faded_noise, rock_high_faded, shade_rough, snow_blend,
@@ -61,6 +63,15 @@ pub fn land_picture_at(
     shaded(land, view, lights, size, far, Some(distances))
 }
 
+/// The share of a footprint that lies above the sea, of the bare field at its middle.
+fn dry_share(field: &Prepared<f64>, bare: &Ground<f64>, footprint: f64) -> f64 {
+    let octaves = f64::from(field.octaves());
+    let left = (octaves - (field.wavelength / footprint).log2()).clamp(0.0, octaves);
+    let spread = height_spread(bare.slope, bare.lost, footprint, left, field.fall);
+    let width = (2.24 * spread).max(0.01);
+    smoothstep(-width, width, bare.height - field.sea)
+}
+
 fn shaded(
     land: &Land,
     view: &View,
@@ -79,8 +90,8 @@ fn shaded(
             domain: "at least 1x1".to_owned(),
         });
     }
-    let field = land.field.prepare::<f64>()?;
-    let top = land.field.bounds()?.maximum;
+    let field = land.prepare::<f64>()?;
+    let top = field.bounds().map_or(2e4, |b| b.maximum);
     let [middle, right, up] = view.rays()?.map(|v| v.as_dvec3());
     let angle = 2.0 * up.length() / rows as f64;
     let eye = view.eye.normalized();
@@ -154,7 +165,14 @@ fn shaded(
             ray.dir,
         );
         let footprint = angle * t / facing.max(0.05);
-        let ground = field.ground_from(place, offset, footprint);
+        let mut ground = field.bare_at(field.moved(place, offset), footprint);
+        // The border of the sea is blended over the heights that a footprint holds.
+        let dry = dry_share(&field, &ground, footprint);
+        ground = Ground {
+            height: ground.height.max(field.sea),
+            slope: ground.slope.map(|s| dry * s),
+            lost: dry * ground.lost,
+        };
         let altitude = altitude_along(start, land.planet_radius + start, dir.y, t);
         let there = [offset[0], altitude, offset[1]];
         let border = faded_noise(&rock, there, [1; 3], 7, footprint);
@@ -173,7 +191,9 @@ fn shaded(
         let radiance = |sun: f64| {
             let light = shade_rough(&lights, ground.slope, ground.lost, to_sun.to_array(), sun);
             std::array::from_fn(|k| {
-                let albedo = bare[k] + snow * (f64::from(m.snow[k]) - bare[k]);
+                let rock = bare[k] + snow * (f64::from(m.snow[k]) - bare[k]);
+                let wet = land.sea.map_or(rock, |s| f64::from(s.albedo[k]));
+                let albedo = wet + dry * (rock - wet);
                 std::f64::consts::FRAC_1_PI * albedo * light[k]
             })
         };

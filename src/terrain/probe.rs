@@ -27,6 +27,8 @@ impl Prepared<f32> {
             seed: self.seed(),
             mean: self.mean,
             lost: self.lost,
+            sea: self.sea,
+            ..Default::default()
         }
     }
 }

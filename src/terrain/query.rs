@@ -107,7 +107,7 @@ impl TerrainQuery {
         let shape = if land.field.on_sphere() {
             Shape::Ball(Box::new(land.globe::<f32>()?))
         } else {
-            Shape::Plane(Box::new(land.field.prepare::<f32>()?))
+            Shape::Plane(Box::new(land.prepare::<f32>()?))
         };
         let map = match &shape {
             Shape::Plane(field) => field.map(),

@@ -368,7 +368,7 @@ impl Land {
                 .map(|ray| globe.ray_hit(ray, pixel_angle, 0.05))
                 .collect();
         }
-        let field = self.field.prepare::<f64>()?;
+        let field = self.prepare::<f64>()?;
         rays.iter()
             .map(|ray| field.ray_hit(self.planet_radius, ray, pixel_angle, 0.05))
             .collect()

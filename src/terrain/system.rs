@@ -565,6 +565,7 @@ impl PlaneTerrain {
             snow_albedo: m.snow,
             snow_noise: m.snow_noise,
             snow_line: m.snow_line,
+            sea_albedo: self.land.sea.map_or([0.0; 3], |s| s.albedo),
             ..Default::default()
         };
         let wavelength = f64::from(m.rock_wavelength);
@@ -625,7 +626,7 @@ mod tests {
     #[test]
     fn no_ground_in_view_is_nearer_than_is_said() {
         let land = Land::default();
-        let field = land.field.prepare::<f32>().unwrap();
+        let field = land.prepare::<f32>().unwrap();
         let far = 4e5;
         let (mut away, mut through_the_air) = (0, 0);
         for k in 0..75 {
@@ -705,7 +706,7 @@ mod tests {
     #[test]
     fn ground_is_looked_for_as_far_as_rays_go() {
         let land = Land::default();
-        let field = land.field.prepare::<f32>().unwrap();
+        let field = land.prepare::<f32>().unwrap();
         let said = |height: f64, pitch: f64, far: f64| {
             let mut view = View {
                 eye: WorldPos::from_metres(glam::DVec3::Y * height),

@@ -204,6 +204,7 @@ fn members(field: &HeightField, single: &Prepared<f32>, place: Place<f64>) -> Fi
         seed: block.seed,
         mean: block.mean.map(f64::from),
         lost: block.lost.map(f64::from),
+        sea: f64::from(block.sea),
     }
 }
 
@@ -472,7 +473,7 @@ fn heights_a_hundred_kilometres_from_the_eye_are_true_to_thirty_millimetres() {
         let block = single.block(single.place(eye));
         let four = |v: [f32; 4]| format!("vec4f({:e}, {:e}, {:e}, {:e})", v[0], v[1], v[2], v[3]);
         let prelude = format!(
-            "fn land() -> Field {{ return Field(vec2i({}, {}), vec2f({:e}, {:e}), {:e}, {:e}, {:e}, {:e}, {:e}, {:e}, {}, {}u, {}, {}); }}",
+            "fn land() -> Field {{ return Field(vec2i({}, {}), vec2f({:e}, {:e}), {:e}, {:e}, {:e}, {:e}, {:e}, {:e}, {}, {}u, {}, {}, {:e}); }}",
             block.cell[0],
             block.cell[1],
             block.frac[0],
@@ -487,6 +488,7 @@ fn heights_a_hundred_kilometres_from_the_eye_are_true_to_thirty_millimetres() {
             block.seed,
             four(block.mean),
             four(block.lost),
+            block.sea,
         );
         let expression = format!(
             "ground_at(land(), {}, vec2f(in.f[0], in.f[1]), in.f[2]).height",

@@ -548,11 +548,6 @@ fn faults_on_a_ball_name_what_is_wrong() {
     );
     let text = fault(|l| l.field.wavelength = 900_000.0);
     assert!(text.contains("field.wavelength"), "{text}");
-    let text = fault(|l| {
-        l.field.domain = Domain::Plane;
-        l.sea = Land::named("terra").unwrap().sea;
-    });
-    assert!(text.contains("land.sea"), "{text}");
     let text = good.field.prepare::<f32>().unwrap_err().to_string();
     assert!(text.contains("Land::globe"), "{text}");
     let text = Land::default().globe::<f32>().unwrap_err().to_string();

@@ -33,6 +33,7 @@ mod planet;
 mod probe;
 mod query;
 mod reference;
+mod sea;
 mod simplex;
 mod sky;
 mod sweep;

@@ -49,7 +49,7 @@ fn position(random: &mut Random, reach: f64) -> WorldPos {
     p
 }
 
-/// Judges `land_at`.
+/// Judges `bare_land_at`.
 #[test]
 fn the_device_and_the_processor_read_maps_alike() {
     let mut random = Random(1);

@@ -33,6 +33,7 @@ struct TerrainView {
     snow_noise: f32,
     // Height below which no snow lies [m].
     snow_line: f32,
+    sea_albedo: vec3<f32>,
 }
 
 @group(0) @binding(0) var<uniform> draw_view: TerrainView;
@@ -120,8 +121,8 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
     #CODE{
 #import veduta::planet::shell::{altitude_of}
 #import veduta::terrain::clipmap::{Clip, Sweep, sun_share}
-#import veduta::terrain::field::{Field}
-#import veduta::terrain::relief::{land_at}
+#import veduta::terrain::field::{Field, height_spread}
+#import veduta::terrain::relief::{bare_land_at}
 #import veduta::terrain::refine::{found_hit}
 #import veduta::terrain::material::{Rock, faded_noise, rock_low_faded, rock_high_faded, snow_blend}
 #import veduta::terrain::shading::{ThreeLights, shade_rough}
@@ -194,7 +195,12 @@ fn draw(in: Corner) -> Shown {
     // A pixel covers more ground the more it slants.
     let normal = normalize(vec3<f32>(-found.slope.x, 1.0, -found.slope.y));
     let footprint = select(1e30, angle * found.distance / max(-dot(normal, dir), 0.05), is_met);
-    let ground = land_at(relief, field, FIELD_KIND, point.xz, footprint);
+    // The ground below the sea too, to blend their border over the heights that a footprint holds.
+    let ground = bare_land_at(relief, field, FIELD_KIND, point.xz, footprint);
+    let left = clamp(f32(field.octaves) - log2(field.wavelength / footprint), 0.0, f32(field.octaves));
+    // A smooth step of half a width of 2.24 has a deviation of 1.
+    let tidal = max(2.24 * height_spread(ground.slope, ground.lost, footprint, left, field.fall), 0.01);
+    let land = smoothstep(-tidal, tidal, ground.height - field.sea);
     let altitude = altitude_of(clip.ground_radius, clip.eye_altitude, point);
     var light = sun_share(heights, shades, wrapping, places, clip, sweep, point.xz);
 #ifdef CLOUD_SHADOWS
@@ -209,13 +215,13 @@ fn draw(in: Corner) -> Shown {
     }
     let border = faded_noise(rock, place, vec3<i32>(1, 1, 1), 7u, footprint);
     // Slopes that are not resolved make the ground steeper than it looks, and the border of the snow wider.
-    let slope = ground.slope;
-    let lost = ground.lost;
+    let slope = land * ground.slope;
+    let lost = land * ground.lost;
     let level = inverseSqrt(1.0 + dot(slope, slope) + lost);
     let blur = 1.2 * level * level * sqrt(lost * (1.0 - level * level));
     let high = smoothstep(draw_view.snow_line - 100.0, draw_view.snow_line + 100.0, altitude + 200.0 * border);
     let snow = high * snow_blend(level, border, draw_view.snow_edge_low - blur, draw_view.snow_edge_high + blur, draw_view.snow_noise);
-    albedo = mix(albedo, draw_view.snow_albedo, snow);
+    albedo = mix(draw_view.sea_albedo, mix(albedo, draw_view.snow_albedo, snow), land);
     var open = 1.0;
     if SKY_SECTORS > 0 {
         open = sky_share(heights, wrapping, places, clip, point.xz, altitude, slope, footprint, select(0, SKY_SECTORS, is_met));

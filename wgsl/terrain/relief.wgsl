@@ -115,7 +115,7 @@ fn relief_ground(relief: texture_2d<f32>, place: Lattice2d, texel: f32, edge: i3
     return Ground(mixed.x, mixed.yz, left * max(mixed.w - dot(mixed.yz, mixed.yz), 0.0));
 }
 
-/// The field at a place, filtered by the footprint: with the map where it has one. `kind` is one of the constants `FIELD_..` of `veduta::terrain::field`; given as an override it costs nothing, and
+/// The bare field at a place, filtered by the footprint, below the sea too: with the map where it has one. `kind` is one of the constants `FIELD_..` of `veduta::terrain::field`; given as an override it costs nothing, and
 /// `relief` is read by `FIELD_MAP` only.
 ///
 /// domain  kind in [0, 7] 1 lin
@@ -125,7 +125,7 @@ fn relief_ground(relief: texture_2d<f32>, place: Lattice2d, texel: f32, edge: i3
 /// error   3e-2 abs of reference::relief::ground
 /// outside undefined
 /// source  CatmullRom1974; Williams1983; slopes left out: ours
-fn land_at(relief: texture_2d<f32>, field: Field, kind: i32, offset: vec2<f32>, footprint: f32) -> Ground {
+fn bare_land_at(relief: texture_2d<f32>, field: Field, kind: i32, offset: vec2<f32>, footprint: f32) -> Ground {
     let detail = ground_at(field, kind, offset, footprint);
     if kind != FIELD_MAP {
         return detail;
@@ -133,4 +133,19 @@ fn land_at(relief: texture_2d<f32>, field: Field, kind: i32, offset: vec2<f32>, 
     let place = field_place(field, offset);
     let map = relief_ground(relief, place, field.wavelength, i32(field.shape), footprint);
     return Ground(map.height + detail.height, map.slope + detail.slope, map.lost + detail.lost);
+}
+
+/// The land at a place, filtered by the footprint: the field, or the level sea above it.
+///
+/// domain  kind in [0, 7] 1 lin
+/// domain  offset in [-1e5, 1e5] m lin
+/// domain  footprint in [1e-3, 1e5] m log
+/// range   [-1e5, 1e5] 1
+/// error   3e-2 abs of reference::relief::ground
+/// outside undefined
+/// source  CatmullRom1974; Williams1983; slopes left out: ours
+fn land_at(relief: texture_2d<f32>, field: Field, kind: i32, offset: vec2<f32>, footprint: f32) -> Ground {
+    let bare = bare_land_at(relief, field, kind, offset, footprint);
+    let dry = !(bare.height < field.sea);
+    return Ground(select(field.sea, bare.height, dry), select(vec2<f32>(0.0), bare.slope, dry), select(0.0, bare.lost, dry));
 }

@@ -447,7 +447,7 @@ fn line(bench: &Bench, name: &str, plan: &Plan) -> Result<Line, CliError> {
         Output::Linear,
     )?;
     renderer.warm_up(&view)?;
-    let field = Land::named("thesis")?.field.prepare()?;
+    let field = Land::named("thesis")?.prepare()?;
     let mut drawers = Vec::new();
     let mut presets = Vec::new();
     let mut ground = 0.0;
@@ -574,7 +574,7 @@ pub fn costs(
     let mut tables = String::new();
     // By preset and view: ratios standing and flying, and what is said of the sharpness.
     let mut lines = vec![Vec::new(); presets.len()];
-    let field = Land::named("thesis")?.field.prepare()?;
+    let field = Land::named("thesis")?.prepare()?;
     for name in &plan.views {
         progress(name);
         let job = thesis(bench, name)?;
@@ -794,7 +794,7 @@ fn flicker(bench: &Bench, frames: usize) -> Result<Flicker, CliError> {
         height: bench.size.height / 2,
     };
     let samples = SAMPLES;
-    let field = Land::named("thesis")?.field.prepare()?;
+    let field = Land::named("thesis")?.prepare()?;
     let job = thesis(bench, "V01")?;
     let set = job.catalog.set();
     let mut view = job.view(0.0, small)?;

@@ -156,7 +156,7 @@ pub fn run(args: &LandArgs) -> Result<(), CliError> {
         (ball.above(place, ground + args.eye_height), ground)
     } else {
         let foot = WorldPos::from_metres(DVec3::new(place[0], 0.0, place[1]));
-        let ground = land.field.prepare::<f64>()?.ground(foot, 0.0).height;
+        let ground = land.prepare::<f64>()?.ground(foot, 0.0).height;
         let up = DVec3::new(0.0, ground + args.eye_height, 0.0);
         (foot.moved_by(up), ground)
     };

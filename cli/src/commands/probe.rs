@@ -556,7 +556,7 @@ fn terrain(args: &TerrainArgs) -> Result<(), CliError> {
                 .collect::<Result<Vec<_>, _>>()?
         }
         Follow::Reference => {
-            let field = land.field.prepare::<f64>()?;
+            let field = land.prepare::<f64>()?;
             let angle = f64::from(args.pixel_angle);
             rays.iter()
                 .map(|r| field.ray_hit(land.planet_radius, r, angle, 0.05))
@@ -622,26 +622,21 @@ fn height(args: &HeightArgs) -> Result<(), CliError> {
     let heights: Vec<u32> = match args.on {
         On::Device => {
             let gpu = veduta::device::shared()?;
-            veduta::terrain::heights(
-                gpu,
-                veduta::programs(),
-                &land.field,
-                &places,
-                args.footprint,
-            )?
-            .iter()
-            .map(|g| g.height.to_bits())
-            .collect()
+            veduta::terrain::TerrainQuery::new(gpu, veduta::programs(), &land)?
+                .heights(&places, args.footprint)?
+                .iter()
+                .map(|g| g.height.to_bits())
+                .collect()
         }
         On::Cpu => {
-            let field = land.field.prepare::<f32>()?;
+            let field = land.prepare::<f32>()?;
             places
                 .iter()
                 .map(|p| field.ground(*p, args.footprint).height.to_bits())
                 .collect()
         }
         On::Reference => {
-            let field = land.field.prepare::<f64>()?;
+            let field = land.prepare::<f64>()?;
             let footprint = f64::from(args.footprint);
             places
                 .iter()

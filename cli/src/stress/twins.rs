@@ -118,8 +118,12 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "rays_over_baked_heights_meet_the_field",
     ),
     (
-        "veduta::terrain::relief::land_at",
+        "veduta::terrain::relief::bare_land_at",
         "the_device_and_the_processor_read_maps_alike",
+    ),
+    (
+        "veduta::terrain::relief::land_at",
+        "the_sea_lies_over_the_land_on_the_device_as_on_the_processor",
     ),
     (
         "veduta::terrain::clipmap::sun_share",
@@ -280,7 +284,8 @@ argument!(Field {
     octaves: i32,
     seed: u32,
     mean: [f64; 4],
-    lost: [f64; 4]
+    lost: [f64; 4],
+    sea: f64
 });
 argument!(Globe {
     cell: [i32; 3],
@@ -884,6 +889,7 @@ impl Entry {
             .lin("field.octaves", 1.0, 12.0)
             .lin("field.mean", 0.1, 0.5)
             .lin("field.lost", 0.1, 0.5)
+            .lin("field.sea", -1e5, -1e4)
     }
 
     /// The domains of a height field on a ball that the promises of errors are for.
@@ -1729,6 +1735,12 @@ pub fn registry() -> Vec<Entry> {
         |field: Field, kind: i32, offset: [f64; 2], footprint: f64| {
             field::ground(&field, kind, offset, footprint)
         }
+    );
+    other!(
+        list,
+        "terrain::field::height_spread",
+        "field::height_spread",
+        field::height_spread
     );
     other!(
         list,
