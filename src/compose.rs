@@ -209,6 +209,7 @@ pub fn program(composed: &Composed) -> Result<ComposedProgram, Error> {
         program: composed.program.clone().into(),
         features: composed.features.iter().cloned().map(Into::into).collect(),
         mentions: composed.mentions.iter().cloned().map(Into::into).collect(),
+        plug_ins: composed.plug_ins.iter().cloned().map(Into::into).collect(),
         stages: composed
             .stages
             .iter()

@@ -65,6 +65,73 @@ impl Targets {
             domain: "1, 2, 4, 8 or 16".to_owned(),
         })
     }
+
+    /// Checks what a device must be able to draw into. With the feature `TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES` formats and numbers of samples beyond those that every device has are the host's to know.
+    ///
+    /// # Errors
+    /// As [`Targets::check`]; [`Error::OutOfDomain`] for a colour format that cannot be drawn into, a depth format without depth, and a number of samples that the device does not have for them.
+    pub fn check_on(&self, device: &wgpu::Device) -> Result<(), Error> {
+        self.check()?;
+        let fault = |name: &str, value: String, domain: &str| Error::OutOfDomain {
+            name: format!("targets.{name}"),
+            value,
+            domain: domain.to_owned(),
+        };
+        if let Some(depth) = self.depth_format
+            && !depth.has_depth_aspect()
+        {
+            let domain = "None or a format with depth";
+            return Err(fault("depth_format", format!("{depth:?}"), domain));
+        }
+        if self.color_format.is_depth_stencil_format() {
+            let domain = "a colour format";
+            return Err(fault(
+                "color_format",
+                format!("{:?}", self.color_format),
+                domain,
+            ));
+        }
+        let formats = [
+            Some(("color_format", self.color_format)),
+            self.depth_format.map(|f| ("depth_format", f)),
+        ];
+        for (name, format) in formats.into_iter().flatten() {
+            if !device.features().contains(format.required_features()) {
+                let domain = format!(
+                    "a format that the device has: this one needs {:?}",
+                    format.required_features()
+                );
+                return Err(fault(name, format!("{format:?}"), &domain));
+            }
+            if device
+                .features()
+                .contains(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
+            {
+                continue;
+            }
+            let can = format.guaranteed_format_features(device.features());
+            if !can
+                .allowed_usages
+                .contains(wgpu::TextureUsages::RENDER_ATTACHMENT)
+            {
+                return Err(fault(
+                    name,
+                    format!("{format:?}"),
+                    "a format that can be drawn into",
+                ));
+            }
+            if !can.flags.sample_count_supported(self.sample_count) {
+                let domain =
+                    format!("what every device has for {format:?}: 1 or 4, for some only 1");
+                return Err(fault(
+                    "sample_count",
+                    self.sample_count.to_string(),
+                    &domain,
+                ));
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Default for Targets {
@@ -310,7 +377,7 @@ impl Landscape {
                 domain: "Perspective: the landscape is drawn from one eye".to_owned(),
             });
         }
-        targets.check()?;
+        targets.check_on(device)?;
         let output = output_of(targets.color_format)?;
         let settings = Settings::resolve(
             programs,

@@ -127,6 +127,8 @@ pub struct ComposedProgram {
     pub features: List<Text>,
     /// Every flag that the program mentions, on or off, in alphabetical order; others make no difference to it.
     pub mentions: List<Text>,
+    /// The modules with an `override fn` that are plugged into it, in alphabetical order.
+    pub plug_ins: List<Text>,
     /// The stages in pipeline order.
     pub stages: List<StageSource>,
     /// Every resource, ordered by group and binding.

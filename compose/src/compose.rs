@@ -40,6 +40,8 @@ pub struct Composed {
     pub features: Vec<String>,
     /// Every flag that the program or a module that it reaches mentions, on or off; in alphabetical order.
     pub mentions: Vec<String>,
+    /// The modules with an `override fn` that are plugged into it; in alphabetical order.
+    pub plug_ins: Vec<String>,
     /// The stages in pipeline order.
     pub stages: Vec<Stage>,
     /// The resources by group and binding, each with all stages that use it.
@@ -87,6 +89,8 @@ struct SourceStage {
     scan: Scan,
     relevant: BTreeSet<String>,
     plug_ins: Vec<String>,
+    /// All that are plugged in: those of the build, and those that the text imports.
+    plugged: Vec<String>,
     place: Diag,
 }
 
@@ -368,6 +372,11 @@ impl Composer {
             .cloned()
             .collect();
         reached.extend(library.reached(plug_ins.iter().map(String::as_str)));
+        let plugged = reached
+            .iter()
+            .filter(|module| module.overrides_functions())
+            .map(|module| module.path.clone())
+            .collect();
         let mut relevant = scan.mentioned(text);
         relevant.extend(
             reached
@@ -380,6 +389,7 @@ impl Composer {
             scan,
             relevant,
             plug_ins,
+            plugged,
             place,
         }
     }
@@ -551,6 +561,12 @@ impl Composer {
                 .relevant
                 .intersection(&self.declared.flags)
                 .cloned()
+                .collect(),
+            plug_ins: done
+                .iter()
+                .flat_map(|(stage, _)| stage.plugged.iter().cloned())
+                .collect::<BTreeSet<String>>()
+                .into_iter()
                 .collect(),
             stages: done
                 .iter()

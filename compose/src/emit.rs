@@ -109,6 +109,8 @@ impl File<'_> {
         self.list(&name("FEATURES"), &format!("{p}::Text"), &features);
         let mentions: Vec<String> = composed.mentions.iter().map(|f| text(f)).collect();
         self.list(&name("MENTIONS"), &format!("{p}::Text"), &mentions);
+        let plug_ins: Vec<String> = composed.plug_ins.iter().map(|f| text(f)).collect();
+        self.list(&name("PLUG_INS"), &format!("{p}::Text"), &plug_ins);
         let mut stages = Vec::new();
         for stage in &composed.stages {
             let kind = match stage.kind {
@@ -306,10 +308,11 @@ impl File<'_> {
             .enumerate()
             .map(|(index, (program, _))| {
                 format!(
-                    "{p}::ComposedProgram {{ program: {}, features: {}, mentions: {}, stages: {}, bindings: {}, overrides: {}, structs: {} }}",
+                    "{p}::ComposedProgram {{ program: {}, features: {}, mentions: {}, plug_ins: {}, stages: {}, bindings: {}, overrides: {}, structs: {} }}",
                     text(program),
                     borrowed(&format!("P{index}_FEATURES")),
                     borrowed(&format!("P{index}_MENTIONS")),
+                    borrowed(&format!("P{index}_PLUG_INS")),
                     borrowed(&format!("P{index}_STAGES")),
                     borrowed(&format!("P{index}_BINDINGS")),
                     borrowed(&format!("P{index}_OVERRIDES")),

@@ -245,7 +245,7 @@ impl Sky {
         targets: &Targets,
         options: &SkyOptions,
     ) -> Result<Sky, Error> {
-        targets.check()?;
+        targets.check_on(device)?;
         let reads_depth = options.composition != SkyComposition::Background;
         if reads_depth && targets.sample_count != 1 {
             return Err(Error::OutOfDomain {

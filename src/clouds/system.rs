@@ -303,7 +303,7 @@ impl Clouds {
         targets: &Targets,
         options: &CloudsOptions,
     ) -> Result<Clouds, Error> {
-        targets.check()?;
+        targets.check_on(device)?;
         options.deck.check()?;
         options.quality.check()?;
         if output_of(targets.color_format)? != 2.0 || targets.color_format.components() < 3 {

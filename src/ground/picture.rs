@@ -209,7 +209,7 @@ impl GroundPicture {
         ground: &Ground,
         options: &GroundPictureOptions,
     ) -> Result<GroundPicture, Error> {
-        targets.check()?;
+        targets.check_on(device)?;
         options.look.check()?;
         if targets.projection == Projection::Orthographic {
             return Err(Error::OutOfDomain {

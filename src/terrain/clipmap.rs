@@ -1,6 +1,6 @@
 //! Baked heights around the eye, made anew only where the eye has uncovered ground.
 
-use super::field::{HeightField, Kind};
+use super::field::{HeightField, Kind, field_kind};
 use super::ground::Prepared;
 use super::land::Land;
 use super::map::Relief;
@@ -164,13 +164,17 @@ pub(super) fn nearest_ground(field: &Prepared<f32>, eye: WorldPos) -> f64 {
 fn uncovered(old: Option<Window>, new: Window, size: i64) -> Vec<Span> {
     let whole = Span {
         from: new,
-        to: new.map(|c| c + size),
+        to: new.map(|c| c.wrapping_add(size)),
     };
     let Some(old) = old else {
         return vec![whole];
     };
-    let moved: [i64; 2] = std::array::from_fn(|k| new[k] - old[k]);
-    if moved.iter().any(|m| m.abs() >= size) {
+    let moved: [i64; 2] = std::array::from_fn(|k| new[k].wrapping_sub(old[k]));
+    // Eyes that jump over half of the world wrap, and are far off all the same.
+    if moved
+        .iter()
+        .any(|m| m.unsigned_abs() >= size.unsigned_abs())
+    {
         return vec![whole];
     }
     let mut spans = Vec::new();
@@ -319,7 +323,7 @@ impl Clipmap {
             .min(needed);
         let levels = (needed / spacing).log2().round() as usize + 1;
         let relief = Relief::new(device, field.map())?;
-        let kind = [("FIELD_KIND", f64::from(land.field.kind.number()))];
+        let kind = [field_kind(programs, ("terrain_bake", &[]), &land.field)?];
         let (bake, bake_layouts) = compute(device, programs, "terrain_bake", &[], &kind)?;
         let (sweep, sweep_layouts) =
             compute(device, programs, "terrain_bake", &["CLIP_SECTORS"], &[])?;
@@ -616,11 +620,13 @@ impl Clipmap {
             places.extend(((1.0 / spacing) as f32).to_le_bytes());
             places.extend((spacing as f32).to_le_bytes());
             let corner = |cell: i64| {
-                (cell - (self.texels - self.block) / 2).div_euclid(self.block) * self.block
+                cell.wrapping_sub((self.texels - self.block) / 2)
+                    .div_euclid(self.block)
+                    .wrapping_mul(self.block)
             };
             let window = [corner(x.0), corner(z.0)];
-            let eye_in: [f32; 2] =
-                [(x, 0), (z, 1)].map(|((cell, rest), k)| ((cell - window[k]) as f64 + rest) as f32);
+            let eye_in: [f32; 2] = [(x, 0), (z, 1)]
+                .map(|((cell, rest), k)| (cell.wrapping_sub(window[k]) as f64 + rest) as f32);
             in_windows.extend(eye_in.iter().flat_map(|c| c.to_le_bytes()));
             in_windows.extend([0; 8]);
             eyes.push((window, eye_in));

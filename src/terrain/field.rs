@@ -7,6 +7,7 @@ use super::ground::Prepared;
 use super::map::HeightMap;
 use super::real::Real;
 use crate::error::Error;
+use crate::program::ProgramSet;
 
 /// Where the field lies.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -509,4 +510,26 @@ impl HeightField {
         ron::to_string(self)
             .map_err(|fault| Error::Ron(format!("the field cannot be written: {fault}")))
     }
+}
+
+/// The override that says which field a program has.
+///
+/// # Errors
+/// The faults of [`ProgramSet::get`]; [`Error::OutOfDomain`] for a program's own function where none is plugged in.
+pub(super) fn field_kind(
+    programs: &ProgramSet,
+    (program, features): (&str, &[&str]),
+    field: &HeightField,
+) -> Result<(&'static str, f64), Error> {
+    let own = matches!(field.kind, Kind::Own { .. });
+    if own && programs.get(program, features)?.plug_ins.is_empty() {
+        return Err(Error::OutOfDomain {
+            name: "field.kind".to_owned(),
+            value: "Own".to_owned(),
+            domain: format!(
+                "a kind that the program `{program}` has: no module with an `override fn height` is plugged into it (`veduta_compose::Build::plug_in`, `Source::plug_in`)"
+            ),
+        });
+    }
+    Ok(("FIELD_KIND", f64::from(field.kind.number())))
 }

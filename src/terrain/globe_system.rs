@@ -49,7 +49,7 @@ impl GlobeTerrain {
         targets: &Targets,
         options: &TerrainOptions,
     ) -> Result<GlobeTerrain, Error> {
-        targets.check()?;
+        targets.check_on(device)?;
         let fault = |name: &str, value: String, domain: &str| Error::OutOfDomain {
             name: name.to_owned(),
             value,

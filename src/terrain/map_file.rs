@@ -29,7 +29,7 @@ impl Land {
     /// Reads a land's file, and that of its height map, which is looked for beside it.
     ///
     /// # Errors
-    /// [`Error::Ron`] for a file that cannot be read, and as [`Land::from_ron`]; as [`HeightMap::read`].
+    /// [`Error::Ron`] with the file's path, for one that cannot be read too; as [`Land::from_ron`] and [`HeightMap::read`].
     pub fn read(path: &Path) -> Result<Land, Error> {
         let text = std::fs::read_to_string(path)
             .map_err(|e| Error::Ron(format!("no land: {}: {e}", path.display())))?;

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group, nearest_ground};
+use super::field::field_kind;
 use super::globe::Globe;
 use super::globe_rays;
 use super::ground::{Ground, Prepared};
@@ -183,7 +184,11 @@ impl TerrainQuery {
         };
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         if self.places.is_none() {
-            let kind = [("FIELD_KIND", f64::from(self.land.field.kind.number()))];
+            let kind = [field_kind(
+                &self.programs,
+                ("terrain_heights", &[]),
+                &self.land.field,
+            )?];
             let made = compute(device, &self.programs, "terrain_heights", &[], &kind)?;
             self.places = Some(made);
         }
@@ -287,7 +292,6 @@ impl TerrainQuery {
             (n, _) => n,
         };
         let device = &self.gpu.device;
-        let kind = ("FIELD_KIND", f64::from(self.land.field.kind.number()));
         let steps_key = ("MAX_MARCHING_STEPS", f64::from(steps));
         let program = match way {
             Way::Ball(fast) => {
@@ -299,17 +303,13 @@ impl TerrainQuery {
                 globe_rays::program(&self.gpu, &self.programs, &self.land, path, steps)?
             }
             Way::Baked => {
+                let variant: (&str, &[&str]) = ("terrain_rays", &["TERRAIN_FAST"]);
+                let kind = field_kind(&self.programs, variant, &self.land.field)?;
                 let constants = [kind, steps_key, ("REFINE_STEPS", 2.0)];
-                let features = ["TERRAIN_FAST"];
-                compute(
-                    device,
-                    &self.programs,
-                    "terrain_rays",
-                    &features,
-                    &constants,
-                )?
+                compute(device, &self.programs, variant.0, variant.1, &constants)?
             }
             Way::Textbook | Way::Bracket => {
+                let kind = field_kind(&self.programs, ("terrain_rays", &[]), &self.land.field)?;
                 let bracket = f64::from(u8::from(way == Way::Bracket));
                 let constants = [kind, steps_key, ("RAY_BRACKET", bracket)];
                 compute(device, &self.programs, "terrain_rays", &[], &constants)?

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group, nearest_ground};
 use super::cloud_shade::{CLOUD_BLOCK, CLOUD_BYTES, CloudShade};
+use super::field::field_kind;
 use super::ground::Prepared;
 use super::land::Land;
 use crate::clouds::CloudShadow;
@@ -272,7 +273,7 @@ impl PlaneTerrain {
         targets: &Targets,
         options: &TerrainOptions,
     ) -> Result<PlaneTerrain, Error> {
-        targets.check()?;
+        targets.check_on(device)?;
         if targets.projection == Projection::Orthographic {
             return Err(Error::OutOfDomain {
                 name: "targets.projection".to_owned(),
@@ -332,8 +333,13 @@ impl PlaneTerrain {
             },
             true,
         )?;
+        let features: &[&str] = if options.cloud_shadows {
+            &["CLOUD_SHADOWS"]
+        } else {
+            &[]
+        };
         let constants = [
-            ("FIELD_KIND", f64::from(options.land.field.kind.number())),
+            field_kind(programs, ("terrain", features), &options.land.field)?,
             ("OUTPUT", output),
             ("CLIP_STEPS", steps),
             ("REFINE_STEPS", number("REFINE_STEPS", 2.0)),
@@ -344,14 +350,7 @@ impl PlaneTerrain {
         let (pipeline, layouts) = surface_pipeline(
             device,
             programs,
-            (
-                "terrain",
-                if options.cloud_shadows {
-                    &["CLOUD_SHADOWS"]
-                } else {
-                    &[]
-                },
-            ),
+            ("terrain", features),
             targets,
             depth_format,
             &constants,

@@ -38,6 +38,7 @@ mod simplex;
 mod sky;
 mod sweep;
 mod tables;
+mod targets;
 mod temporal;
 mod terrain;
 mod tone_map;

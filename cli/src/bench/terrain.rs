@@ -74,6 +74,8 @@ pub struct Line {
     pub ground: f64,
     /// Milliseconds of the preset `thesis`, by round.
     pub thesis: Vec<f64>,
+    /// The same half way along the flight.
+    pub thesis_flying: Vec<f64>,
     /// `thesis` against its own converged picture (dB).
     pub thesis_psnr: f64,
     /// The presets.
@@ -430,6 +432,40 @@ fn drawn_hits(
     Ok((rays, hits, 2.0 * up.length() / f64::from(size.height)))
 }
 
+/// Judges the hits that a preset draws of all pixels. Those that eight times the steps change are told as out of steps.
+fn judged(
+    bench: &Bench,
+    set: &ProgramSet,
+    preset: &str,
+    view: &View,
+) -> Result<HitErrors, CliError> {
+    let mut patient = set.clone();
+    for key in patient.keys.to_mut() {
+        if let ("CLIP_STEPS", Value::Int(steps)) = (&*key.name, &mut key.default) {
+            *steps *= 8;
+        }
+    }
+    let mut found = Vec::new();
+    for set in [set, &patient] {
+        let mut drawer = Drawer::new(bench, set, preset, bench.size, 0)?;
+        drawer.frame(bench, view)?;
+        found.push(drawn_hits(bench, &drawer, view)?);
+    }
+    let (_, patient, _) = found.swap_remove(1);
+    let (rays, mut hits, angle) = found.swap_remove(0);
+    for (hit, other) in hits.iter_mut().zip(patient) {
+        hit.capped = hit.distance.to_bits() != other.distance.to_bits();
+    }
+    let land = Land::named("thesis")?;
+    Ok(hit_errors(
+        &land,
+        &rays,
+        bench.size.width as usize,
+        angle,
+        &hits,
+    )?)
+}
+
 fn line(bench: &Bench, name: &str, plan: &Plan) -> Result<Line, CliError> {
     let job = thesis(bench, name)?;
     let set = job.catalog.set();
@@ -489,29 +525,27 @@ fn line(bench: &Bench, name: &str, plan: &Plan) -> Result<Line, CliError> {
         presets.push(entry);
         drawers.push([alone, joining]);
     }
-    let mut times = Vec::new();
+    let (mut times, mut flying) = (Vec::new(), Vec::new());
+    let midway = flown(&field, &view, FRAMES[1] / 2);
     for _ in 0..plan.rounds {
-        let cost = renderer.draw(&view, Tiling::Adaptive, &mut |_| {})?;
-        times.push(cost.cpu_ms.unwrap_or(f64::NAN));
+        for (times, view) in [(&mut times, view), (&mut flying, midway)] {
+            let cost = renderer.draw(&view, Tiling::Adaptive, &mut |_| {})?;
+            times.push(cost.cpu_ms.unwrap_or(f64::NAN));
+        }
         for ([alone, joining], entry) in drawers.iter_mut().zip(&mut presets) {
             entry.alone.push(alone.frame(bench, &view)?[1]);
             joining.frame(bench, &view)?;
             entry.draws.push(joining.frame(bench, &view)?[1]);
         }
     }
-    // What `high` draws of all pixels.
-    let alone = &mut drawers[0][0];
-    alone.frame(bench, &view)?;
-    let (rays, found, angle) = drawn_hits(bench, alone, &view)?;
-    let land = Land::named("thesis")?;
-    let columns = bench.size.width as usize;
     Ok(Line {
         view: name.to_owned(),
         ground,
         thesis: times,
+        thesis_flying: flying,
         thesis_psnr,
         presets,
-        hits: hit_errors(&land, &rays, columns, angle, &found)?,
+        hits: judged(bench, set, PRESETS[0], &view)?,
     })
 }
 
@@ -524,7 +558,7 @@ pub fn hits(
     plan: &Plan,
     progress: &mut dyn FnMut(&str),
 ) -> Result<String, CliError> {
-    let mut judged = Vec::new();
+    let mut rows = Vec::new();
     let mut times = String::new();
     for name in &plan.views {
         progress(name);
@@ -537,15 +571,9 @@ pub fn hits(
             .map(|_| Ok(drawer.frame(bench, &view)?[1]))
             .collect::<Result<_, CliError>>()?;
         times += &format!("- {name}: {:.1} ms\n", middle(&draws));
-        let (rays, found, angle) = drawn_hits(bench, &drawer, &view)?;
-        let land = Land::named("thesis")?;
-        let columns = bench.size.width as usize;
-        judged.push((
-            name.clone(),
-            hit_errors(&land, &rays, columns, angle, &found)?,
-        ));
+        rows.push((name.clone(), judged(bench, set, PRESETS[0], &view)?));
     }
-    let rows = hit_rows(judged.iter().map(|(name, h)| (name.as_str(), h)));
+    let rows = hit_rows(rows.iter().map(|(name, h)| (name.as_str(), h)));
     Ok(format!(
         "{}\nDraws of all pixels by `high`:\n\n{times}",
         table(&rows)
@@ -621,11 +649,18 @@ pub fn costs(
             }
             drawers.push(([standing, flying], sharp));
         }
-        let mut baseline = Vec::new();
+        // `thesis` standing, and where the flight is.
+        let mut baseline = [Vec::new(), Vec::new()];
         let mut measured = vec![vec![Vec::new(); columns.len()]; presets.len()];
         for round in 0..plan.rounds {
-            let cost = renderer.draw(&view, Tiling::Adaptive, &mut |_| {})?;
-            baseline.push(cost.cpu_ms.unwrap_or(f64::NAN));
+            let middle_frame = FRAMES[1] + 2 * PACED * round + PACED;
+            for (times, view) in baseline
+                .iter_mut()
+                .zip([view, flown(&field, &view, middle_frame)])
+            {
+                let cost = renderer.draw(&view, Tiling::Adaptive, &mut |_| {})?;
+                times.push(cost.cpu_ms.unwrap_or(f64::NAN));
+            }
             for ((both, _), times) in drawers.iter_mut().zip(&mut measured) {
                 for (k, drawer) in both.iter_mut().enumerate() {
                     let mut sums = [0.0; 5];
@@ -658,7 +693,7 @@ pub fn costs(
             })
             .collect::<Result<_, _>>()?;
         for (k, ((_, sharp), times)) in drawers.iter().zip(&measured).enumerate() {
-            let ratio = |i: usize| Ratio::of(&times[i], &baseline);
+            let ratio = |i: usize| Ratio::of(&times[i], &baseline[usize::from(i >= 5)]);
             // What is baked comes by fits and starts in a flight.
             let typical = |i: usize| {
                 if i < 5 {
@@ -669,22 +704,24 @@ pub fn costs(
             };
             let mut row = vec![
                 name.clone(),
-                format!("{:.1}", middle(&baseline)),
+                format!("{:.1}", middle(&baseline[0])),
+                format!("{:.1}", middle(&baseline[1])),
                 ratio(0).to_string(),
                 ratio(5).to_string(),
             ];
             row.extend((0..times.len()).map(|i| format!("{:.2}", typical(i))));
             row.push(format!("{:.2}", middle(&empty)));
             row.extend([own, sharp[0], sharp[1]].map(|p| format!("{p:.1}")));
-            let mut numbers: Vec<f64> = vec![middle(&baseline)];
+            let mut numbers: Vec<f64> = vec![middle(&baseline[0])];
             numbers.extend((0..times.len()).map(typical));
-            numbers.extend([own, sharp[0], sharp[1]]);
+            numbers.extend([own, sharp[0], sharp[1], middle(&baseline[1])]);
             lines[k].push((row, numbers));
         }
     }
     let mut head = [
         "View",
-        "`thesis` [ms]",
+        "`thesis` standing [ms]",
+        "flying",
         "standing / thesis",
         "flying / thesis",
     ]
@@ -698,12 +735,13 @@ pub fn costs(
             .map(|(_, n)| n)
             .filter(|n| n[11].is_finite())
             .collect();
-        let mean = |i: usize| average(&shown.iter().map(|n| n[i]).collect::<Vec<_>>());
+        let mean = |i: usize| finite(shown.iter().map(|n| n[i]));
         let mut last = vec![
             "mean".to_owned(),
             format!("{:.1}", mean(0)),
+            format!("{:.1}", mean(14)),
             format!("{:.4}", mean(1) / mean(0)),
-            format!("{:.4}", mean(6) / mean(0)),
+            format!("{:.4}", mean(6) / mean(14)),
         ];
         last.extend((1..11).map(|i| format!("{:.2}", mean(i))));
         last.push(String::new());
@@ -728,6 +766,7 @@ fn hit_rows<'a>(judged: impl Iterator<Item = (&'a str, &'a HitErrors)>) -> Vec<V
         "hits",
         "wrong [%]",
         "at the silhouette [%]",
+        "out of steps",
         "median",
         "95 %",
         "99 %",
@@ -741,6 +780,7 @@ fn hit_rows<'a>(judged: impl Iterator<Item = (&'a str, &'a HitErrors)>) -> Vec<V
             h.across.len().to_string(),
             percent(h.wrong),
             percent(h.at_silhouette),
+            h.capped.to_string(),
             format!("{:.3}", h.centile(0.5)),
             format!("{:.3}", h.centile(0.95)),
             format!("{:.3}", h.centile(0.99)),
@@ -885,13 +925,7 @@ pub fn run(bench: &Bench, plan: &Plan, progress: &mut dyn FnMut(&str)) -> Result
 
 /// Means over the views that show ground.
 fn mean(report: &Report, of: &dyn Fn(&Line) -> f64) -> f64 {
-    let values: Vec<f64> = report
-        .lines
-        .iter()
-        .filter(|l| l.ground > 0.0)
-        .map(of)
-        .collect();
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+    finite(report.lines.iter().filter(|l| l.ground > 0.0).map(of))
 }
 
 fn middle(values: &[f64]) -> f64 {
@@ -900,6 +934,11 @@ fn middle(values: &[f64]) -> f64 {
 
 fn average(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// The mean of what is a number: a flight that has left the ground behind has no error to speak of.
+fn finite(values: impl Iterator<Item = f64>) -> f64 {
+    average(&values.filter(|v| v.is_finite()).collect::<Vec<_>>())
 }
 
 /// The report as a document.
@@ -970,7 +1009,10 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
         .map(|(k, preset)| {
             let of = |p: &Entry| average(&p.flown) + average(&p.bakes);
             let all = mean(report, &|l| of(&l.presets[k]));
-            format!("`{preset}` {:.3}", all / thesis)
+            format!(
+                "`{preset}` {:.3}",
+                all / mean(report, &|l| middle(&l.thesis_flying))
+            )
         })
         .collect();
     let hits = hit_rows(report.lines.iter().map(|l| (l.view.as_str(), &l.hits)));
@@ -1001,11 +1043,11 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
         "# What the terrain costs and how far it is off\n\nWritten by `{command}`.\n\n{}\n\
          The mountains of the preset `thesis` alone, without air or clouds, and the land `thesis` with its lights. Presets draw fewer pixels than the picture has, `high` half\n\
          and `low` 0.26 of them a side, and `Temporal` joins the frames (`low` without its cubic); `alone` draws all pixels and joins nothing. Milliseconds are those of a draw with joining\n\
-         (median) and, in a flight at 100 m/s with 30 frames a second, of a draw with joining and of baking (means). Flights with bakes over `thesis`, means: {}.\n\
+         (median) and, in a flight at 100 m/s with 30 frames a second, of a draw with joining and of baking (means). Flights with bakes over `thesis` half way along them, means: {}.\n\
          The first bake and the memory of heights: {}.\n\n{}\n\
          ## Against many samples\n\nPSNR of each against itself with {SAMPLES} x {SAMPLES} samples a pixel: of `thesis`, of an eye that stands after {} frames, of the last of {} frames of the\n\
          flight, and of one frame of all pixels alone. The last line is the mean over the views that show ground.\n\n{}\n\
-         ## Hits\n\nWhere the depth that `high` draws of all pixels says that they are, against bracketing in f64; errors across the ray in footprints (bars: 0.02 % wrong, 0.3 % at the\nsilhouette, 0.5 for 99 %).\n\n{}{flight}",
+         ## Hits\n\nWhere the depth that `high` draws of all pixels says that they are, against bracketing in f64; errors across the ray in footprints (bars: 0.02 % wrong, 0.3 % at the\nsilhouette, 0.5 for 99 %). Out of steps are those that eight times the steps change.\n\n{}{flight}",
         bench.machine(),
         whole.join(", "),
         bakes.join(", "),
@@ -1028,6 +1070,7 @@ pub fn to_json(bench: &Bench, report: &Report, command: &str) -> serde_json::Val
                 "view": l.view,
                 "ground": l.ground,
                 "thesis": l.thesis,
+                "thesis_flying": l.thesis_flying,
                 "thesis_psnr": l.thesis_psnr,
                 "presets": PRESETS.iter().zip(&l.presets).map(|(name, p)| json!({
                     "preset": name,
@@ -1045,6 +1088,7 @@ pub fn to_json(bench: &Bench, report: &Report, command: &str) -> serde_json::Val
                     "met": l.hits.across.len(),
                     "wrong": l.hits.wrong,
                     "at_silhouette": l.hits.at_silhouette,
+                    "out_of_steps": l.hits.capped,
                     "centile_99": l.hits.centile(0.99),
                 },
             })

@@ -490,11 +490,18 @@ fn layer(args: &CloudsArgs) -> Result<(), CliError> {
 /// A shipped land by its name, or that of a `.ron` file.
 ///
 /// # Errors
-/// [`CliError::Read`], [`CliError::Table`] with the file and what is wrong in it, a name that does not exist.
+/// [`CliError::Read`], [`CliError::Table`] with the file and what is wrong in it, a name that does not exist, a land of a program's own function.
 pub fn land(name: &str) -> Result<Land, CliError> {
     let mut land = named_or_file(name, Land::named, Land::from_ron)?;
     if let Some(map) = &mut land.field.map {
         map.read(Path::new(name).parent().unwrap_or(Path::new("")))?;
+    }
+    if let veduta::terrain::Kind::Own { .. } = land.field.kind {
+        return Err(CliError::argument(
+            "the land's field.kind",
+            "Own".to_owned(),
+            "a kind that the shipped programs have: a program's own function is plugged in when it is built",
+        ));
     }
     Ok(land)
 }

@@ -62,6 +62,39 @@ fn heights_stand_in_the_order_of_their_places() {
         )
     };
     run("far.csv", "1e17,0\n").bad(1, &["row 0", "9e15"]);
+    std::fs::write(
+        dir.join("own.ron"),
+        "(field: (kind: Own(gain: 2, smoothness: 0), wavelength: 4096, amplitude: 300, octaves: 8, hurst: 0.9))",
+    )
+    .unwrap();
+    std::fs::write(dir.join("here.csv"), "0,0\n").unwrap();
+    for on in ["cpu", "device", "reference"] {
+        let arguments = [
+            "probe", "height", "--scene", "own.ron", "--points", "here.csv", "--on", on, "--out",
+            "h.npy",
+        ];
+        veduta(&dir, &arguments).bad(1, &["field.kind", "Own"]);
+    }
+    let rest = ["--out", "h.npy"];
+    for (more, named) in [
+        (["--footprint", "-1"], "--footprint"),
+        (["--footprint", "NaN"], "--footprint"),
+        (["--scene", "nowhere"], "nowhere"),
+    ] {
+        let arguments = [
+            &["probe", "height", "--points", "here.csv"],
+            &more[..],
+            &rest,
+        ]
+        .concat();
+        let answer = veduta(&dir, &arguments);
+        answer.bad(1, &[named]);
+    }
+    std::fs::write(dir.join("pole.csv"), "95,0\n").unwrap();
+    let arguments = [
+        "probe", "height", "--scene", "terra", "--points", "pole.csv", "--out", "h.npy",
+    ];
+    veduta(&dir, &arguments).bad(1, &["row 0", "95"]);
 }
 
 #[test]
