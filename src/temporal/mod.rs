@@ -47,6 +47,18 @@ impl TemporalOptions {
         }
     }
 
+    /// For a result of this size, from a picture of a share of its pixels a side, in whole pixels. [`TemporalOptions::check`] refuses what comes of shares that are not in [0.25, 1].
+    pub fn of_share(size: [u32; 2], share: f64) -> TemporalOptions {
+        let taken = size.map(|n| {
+            let least = if share >= 0.25 { n.div_ceil(4) } else { 0 };
+            ((f64::from(n) * share).round() as u32).max(least)
+        });
+        TemporalOptions {
+            taken,
+            ..TemporalOptions::of(size)
+        }
+    }
+
     /// Checks every field.
     ///
     /// # Errors

@@ -13,6 +13,7 @@ use crate::landscape::{Depth, Projection, Resources, Targets, Work, output_of};
 use crate::program::{Pipeline, PipelineOptions, ProgramSet};
 use crate::programs::blocks::{Field as FieldBlock, Rock as RockBlock, TerrainView as ViewBlock};
 use crate::settings::{Preset, Settings};
+use crate::temporal::TemporalOptions;
 use crate::view::{View, WorldPos};
 
 /// Columns of the picture.
@@ -90,6 +91,25 @@ impl Default for TerrainOptions {
             sky_sectors: 0,
             texels: 0,
             cloud_shadows: false,
+        }
+    }
+}
+
+impl TerrainOptions {
+    /// How frames of the ground alone are joined to a picture of a size, as `docs/terrain.md` measures them: `high` from half of its pixels a side, `low` from 0.26 of them and without the cubic,
+    /// other presets from all of them. The host draws a picture of [`TemporalOptions::taken`] pixels, leaves it transparent where there is no ground, and nothing moves but the eye.
+    pub fn joined(&self, programs: &ProgramSet, size: [u32; 2]) -> TemporalOptions {
+        let name = self.preset.name(programs);
+        let share = match name {
+            "high" => 0.5,
+            "low" => 0.26,
+            _ => 1.0,
+        };
+        TemporalOptions {
+            bound: f32::INFINITY,
+            sharp: name != "low",
+            has_empty: true,
+            ..TemporalOptions::of_share(size, share)
         }
     }
 }

@@ -7,6 +7,9 @@ mod earth_and_moon;
 #[path = "../../examples/host_app.rs"]
 mod host_app;
 #[allow(dead_code)]
+#[path = "../../examples/joined_terrain.rs"]
+mod joined_terrain;
+#[allow(dead_code)]
 #[path = "../../examples/sky_over_host.rs"]
 mod sky_over_host;
 
@@ -44,6 +47,35 @@ fn host_app_draws_a_landscape_in_under_80_lines() {
     assert!(
         pixels.chunks(4).all(|p| p[3] == 255),
         "every pixel is opaque"
+    );
+}
+
+#[test]
+fn joined_terrain_is_sharper_with_every_frame() {
+    let size = [96, 54];
+    let picture = |frames| -> Vec<f32> {
+        joined_terrain::draw(size, frames, 0.0)
+            .unwrap()
+            .chunks_exact(2)
+            .map(|b| joined_terrain::number([b[0], b[1]]))
+            .collect()
+    };
+    let truth = picture(256);
+    let off = |frames| {
+        let squares = picture(frames)
+            .iter()
+            .zip(&truth)
+            .map(|(a, b)| (a - b).powi(2))
+            .sum::<f32>();
+        (squares / truth.len() as f32).sqrt()
+    };
+    let errors = [1, 4, 32].map(off);
+    println!("{errors:?}");
+    assert_eq!(truth.len(), 4 * 96 * 54);
+    assert!(truth.iter().all(|v| v.is_finite()));
+    assert!(
+        errors[1] < 0.9 * errors[0] && errors[2] < 0.6 * errors[1],
+        "{errors:?}"
     );
 }
 

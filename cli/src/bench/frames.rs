@@ -7,7 +7,6 @@ use veduta::temporal::{Temporal, TemporalOptions};
 use veduta::terrain::{Land, Terrain, TerrainLights, TerrainOptions};
 use veduta::{Preset, Targets, Value, View, wgpu};
 
-use super::terrain::fewer;
 use super::timing::{Middle, Ratio};
 use super::{Bench, decibels, table};
 use crate::commands::render::Job;
@@ -60,7 +59,9 @@ fn part(preset: &str) -> &'static str {
 
 /// The picture that a preset draws for one of this size.
 fn taken(preset: &str, size: Size) -> Size {
-    fewer(size, if preset == "low" { 2.5 } else { 2.0 })
+    let share = if preset == "low" { 0.4 } else { 0.5 };
+    let [width, height] = TemporalOptions::of_share([size.width, size.height], share).taken;
+    Size { width, height }
 }
 
 /// Of one preset on one view.

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 use veduta::glam::Vec3;
-use veduta::temporal::{Temporal, TemporalOptions};
+use veduta::temporal::Temporal;
 use veduta::terrain::{
     HitErrors, Land, Prepared, Terrain, TerrainHit, TerrainLights, TerrainOptions, TerrainRay,
     hit_errors,
@@ -123,16 +123,9 @@ impl Drawer {
         size: Size,
         texels: u32,
     ) -> Result<Drawer, CliError> {
-        let taken = taken(preset, size);
-        let mut drawer = Drawer::new(bench, programs, preset, taken, texels)?;
-        let options = TemporalOptions {
-            taken: [taken.width, taken.height],
-            size: [size.width, size.height],
-            bound: f32::INFINITY,
-            sharp: preset != "low",
-            has_empty: true,
-            ..TemporalOptions::of([size.width, size.height])
-        };
+        let options = options(preset, texels)?.joined(programs, [size.width, size.height]);
+        let [width, height] = options.taken;
+        let mut drawer = Drawer::new(bench, programs, preset, Size { width, height }, texels)?;
         let mut temporal = Temporal::new(&bench.gpu.device, programs, &options)?;
         let color = drawer.color.create_view(&Default::default());
         temporal.set_host(&bench.gpu.device, &color, &drawer.depth)?;
@@ -154,13 +147,7 @@ impl Drawer {
             depth_format: Some(wgpu::TextureFormat::Depth32Float),
             ..Default::default()
         };
-        let options = TerrainOptions {
-            preset: Preset::Named(preset.to_owned().into()),
-            land: Land::named("thesis")?,
-            far: FAR,
-            texels,
-            ..Default::default()
-        };
+        let options = options(preset, texels)?;
         let depth = device
             .create_texture(&wgpu::TextureDescriptor {
                 label: Some("depth"),
@@ -373,19 +360,15 @@ fn part(preset: &str) -> &'static str {
     if preset == "low" { "13/50" } else { "1/2" }
 }
 
-/// The picture that a preset draws for one of this size.
-fn taken(preset: &str, size: Size) -> Size {
-    fewer(size, if preset == "low" { 50.0 / 13.0 } else { 2.0 })
-}
-
-/// A picture of fewer pixels a side by a factor.
-pub(super) fn fewer(size: Size, ratio: f64) -> Size {
-    // Not below what `Temporal` takes.
-    let less = |n: u32| ((f64::from(n) / ratio).round() as u32).max(n.div_ceil(4));
-    Size {
-        width: less(size.width),
-        height: less(size.height),
-    }
+/// The ground that is measured.
+fn options(preset: &str, texels: u32) -> Result<TerrainOptions, CliError> {
+    Ok(TerrainOptions {
+        preset: Preset::Named(preset.to_owned().into()),
+        land: Land::named("thesis")?,
+        far: FAR,
+        texels,
+        ..Default::default()
+    })
 }
 
 fn larger(size: Size, by: u32) -> Size {
