@@ -15,19 +15,19 @@ fn earth() -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Material {
-    /// Albedo of the darkest rock.
+    /// Albedo of the darkest rock, each channel in [0, 1].
     pub rock_dark: [f32; 3],
-    /// Albedo of the lightest rock.
+    /// Albedo of the lightest rock, each channel in [0, 1].
     pub rock_light: [f32; 3],
     /// Wavelength of the coarsest rock texture (m), in [1, 1e6].
     pub rock_wavelength: f32,
     /// Albedo of weathered stains as a share of the darkest rock's, in [0, 1].
     pub rock_stain: f32,
-    /// Albedo of snow.
+    /// Albedo of snow, each channel in [0, 1].
     pub snow: [f32; 3],
-    /// Slope (1 - normal.y) up to which snow covers everything; below -1 there is none.
+    /// Slope (1 - normal.y) up to which snow covers everything, in [-10, 2]; below -1 there is none.
     pub snow_edge_low: f32,
-    /// Slope from which no snow lies.
+    /// Slope from which no snow lies, in [-10, 2].
     pub snow_edge_high: f32,
     /// How irregular the border of the snow is, in [0, 1].
     pub snow_noise: f32,
@@ -92,7 +92,7 @@ impl Material {
 pub struct Sea {
     /// Height of its level (m), in [-2e4, 2e4].
     pub level: f64,
-    /// Its albedo.
+    /// Its albedo, each channel in [0, 1].
     pub albedo: [f32; 3],
 }
 

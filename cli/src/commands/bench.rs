@@ -388,6 +388,15 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 } else {
                     terrain::costs(&bench, &plan, &args.of, &mut progress)?
                 };
+                let title = if args.hits {
+                    "Where the terrain's rays end"
+                } else {
+                    "What whole frames of terrain cost"
+                };
+                let text = format!(
+                    "# {title}\n\nWritten by `{command}`.\n\n{}\n\n{text}",
+                    bench.machine()
+                );
                 bar.finish_and_clear();
                 print!("{text}");
                 return match &args.out {
