@@ -322,6 +322,90 @@ impl View {
     }
 }
 
+/// The rays of a picture's pixels, to pick what lies under a cursor and to read depth back.
+///
+/// ```
+/// use veduta::terrain::{Land, TerrainRay};
+/// let land = Land::named("hills")?;
+/// let mut view = veduta::View::default();
+/// view.eye = veduta::WorldPos::from_metres([0.0, 2000.0, 0.0].into());
+/// view.look(0.0, -0.5, 1.0, 16.0 / 9.0);
+/// let pixels = view.pixels([1280, 720])?;
+/// // What is under the cursor, which is 200 pixels from the left and 500 from the top.
+/// let dir = pixels.direction([200.0, 500.0]).to_array();
+/// let hit = land.ray_hits(&[TerrainRay { origin: view.eye, dir, far: 1e5 }], pixels.angle())?[0];
+/// assert!(hit.distance < 1e4);
+/// # Ok::<(), veduta::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pixels {
+    middle: DVec3,
+    right: DVec3,
+    up: DVec3,
+    forward: DVec3,
+    size: [f64; 2],
+    /// Of the projection: what depth and w of clip space have of z and of 1.
+    depth: [f64; 4],
+}
+
+impl View {
+    /// The rays of a picture of so many pixels across and down.
+    ///
+    /// # Errors
+    /// As [`View::rays`]; [`Error::OutOfDomain`] for a picture without pixels.
+    pub fn pixels(&self, size: [u32; 2]) -> Result<Pixels, Error> {
+        if size.contains(&0) {
+            return Err(Error::OutOfDomain {
+                name: "size".to_owned(),
+                value: format!("{}x{}", size[0], size[1]),
+                domain: "at least 1x1".to_owned(),
+            });
+        }
+        let [middle, right, up] = self.rays()?.map(|v| v.as_dvec3());
+        let p = &self.projection;
+        Ok(Pixels {
+            middle,
+            right,
+            up,
+            forward: self
+                .world_from_view
+                .transform_vector3(Vec3::NEG_Z)
+                .as_dvec3(),
+            size: size.map(f64::from),
+            depth: [p.z_axis.z, p.w_axis.z, p.z_axis.w, p.w_axis.w].map(f64::from),
+        })
+    }
+}
+
+impl Pixels {
+    /// Unit direction, along the world's axes, of the ray through a place of the picture, in pixels from its upper left corner: the middle of the first pixel is at (0.5, 0.5).
+    pub fn direction(&self, at: [f64; 2]) -> DVec3 {
+        let [x, y] = [
+            2.0 * at[0] / self.size[0] - 1.0,
+            1.0 - 2.0 * at[1] / self.size[1],
+        ];
+        (self.middle + x * self.right + y * self.up).normalize()
+    }
+
+    /// Angle of a pixel in the middle of the picture (rad).
+    pub fn angle(&self) -> f64 {
+        2.0 * self.up.length() / self.size[1]
+    }
+
+    /// Distance from the eye (m) along the ray through a place of the picture, from what the depth buffer has there, by whichever depth the view's projection has; infinite where that is the depth of nothing or behind the eye.
+    pub fn distance(&self, at: [f64; 2], depth: f32) -> f64 {
+        let d = f64::from(depth);
+        let [zz, zw, wz, ww] = self.depth;
+        let ahead = (zw - d * ww) / (zz - d * wz);
+        let distance = ahead / self.direction(at).dot(self.forward);
+        if distance.is_finite() && distance > 0.0 {
+            distance
+        } else {
+            f64::INFINITY
+        }
+    }
+}
+
 impl Light {
     /// Checks every field; `name` stands before the field in the message.
     ///

@@ -60,6 +60,10 @@ fn every_depth_leads_back_to_the_ground() {
         gpu.queue.submit([encoder.finish()]);
         let clear = if depth == Depth::Normal { 1.0 } else { 0.0 };
         let (_, depths, _) = crate::land::drawn(&terrain, columns, rows, clear);
+        let pixels = view.pixels([columns as u32, rows as u32]).unwrap();
+        assert!(
+            (pixels.distance([1.0, 1.0], clear)).is_infinite() || depth != Depth::ReversedInfinite
+        );
         let inverse = projection.as_dmat4().inverse();
         let world = view.world_from_view.as_dmat4();
         let pixel_angle = 2.0 * f64::from(angle / 2.0).tan() / rows as f64;
@@ -78,6 +82,14 @@ fn every_depth_leads_back_to_the_ground() {
             };
             let p = place(f64::from(*written));
             let distance = p.length();
+            let pixel = [i % columns, i / columns].map(|k| k as f64 + 0.5);
+            // What hosts are given is the same as by the inverse of the matrix.
+            let said = pixels.distance(pixel, *written);
+            assert!(
+                (said - distance).abs() < 2e-5 * distance,
+                "{depth:?}: {said} {distance}"
+            );
+            assert!(pixels.direction(pixel).distance(p / distance) < 1e-6);
             // What the next number of the format stands for.
             let next = f32::from_bits(written.to_bits() ^ 1);
             let grain = (place(f64::from(next)) - p).length();

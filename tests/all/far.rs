@@ -80,26 +80,14 @@ fn judged(
     gpu.queue.submit([encoder.finish()]);
     let (colors, depths, _) = crate::land::drawn(&terrain, columns, rows, 0.0);
     // Where the depth says that the ground is.
-    let [middle, right, up] = view.rays().unwrap().map(|v| v.as_dvec3());
-    let forward = view
-        .world_from_view
-        .transform_vector3(Vec3::NEG_Z)
-        .as_dvec3();
-    let [from, scale] = [view.projection.w_axis.z, view.projection.z_axis.z].map(f64::from);
-    let place = |k: usize, n: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
+    let pixels = view.pixels([columns as u32, rows as u32]).unwrap();
     let (rays, hits): (Vec<TerrainRay>, Vec<TerrainHit>) = (0..columns * rows)
         .map(|i| {
-            let ray = middle + right * place(i % columns, columns) - up * place(i / columns, rows);
-            let dir = ray.normalize();
-            let linear = from / (f64::from(depths[i]) + scale);
-            let distance = if depths[i] > 0.0 {
-                linear / dir.dot(forward)
-            } else {
-                f64::INFINITY
-            };
+            let at = [i % columns, i / columns].map(|k| k as f64 + 0.5);
+            let distance = pixels.distance(at, depths[i]);
             let ray = TerrainRay {
                 origin: view.eye,
-                dir: dir.to_array(),
+                dir: pixels.direction(at).to_array(),
                 far,
             };
             (
@@ -111,7 +99,7 @@ fn judged(
             )
         })
         .unzip();
-    let angle = 2.0 * up.length() / rows as f64;
+    let angle = pixels.angle();
     let errors = hit_errors(&land, &rays, columns, angle, &hits).unwrap();
     // The light of double precision at the places that were drawn.
     let distances: Vec<f64> = hits.iter().map(|h| h.distance).collect();

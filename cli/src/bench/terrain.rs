@@ -385,34 +385,23 @@ fn drawn_hits(
     view: &View,
 ) -> Result<(Vec<TerrainRay>, Vec<TerrainHit>, f64), CliError> {
     let size = drawer.size;
-    let [middle, right, up] = view.rays()?.map(|v| v.as_dvec3());
-    let forward = view
-        .world_from_view
-        .transform_vector3(Vec3::NEG_Z)
-        .as_dvec3();
-    let [from, scale] = [view.projection.w_axis.z, view.projection.z_axis.z].map(f64::from);
-    let at = |i: u32, n: u32| 2.0 * (f64::from(i) + 0.5) / f64::from(n) - 1.0;
+    let pixels = view.pixels([size.width, size.height])?;
     let bytes = bench.gpu.read_texture(drawer.depth.texture())?;
     let (mut rays, mut hits) = (Vec::new(), Vec::new());
     for (i, b) in (0..).zip(bytes.chunks_exact(4)) {
-        let depth = f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let (x, y) = (i % size.width, i / size.width);
-        let dir = (middle + right * at(x, size.width) - up * at(y, size.height)).normalize();
+        let depth = f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+        let at = [i % size.width, i / size.width].map(|k: u32| f64::from(k) + 0.5);
         rays.push(TerrainRay {
             origin: view.eye,
-            dir: dir.to_array(),
+            dir: pixels.direction(at).to_array(),
             far: FAR,
         });
         hits.push(TerrainHit {
-            distance: if depth > 0.0 {
-                from / (depth + scale) / dir.dot(forward)
-            } else {
-                f64::INFINITY
-            },
+            distance: pixels.distance(at, depth),
             ..TerrainHit::MISS
         });
     }
-    Ok((rays, hits, 2.0 * up.length() / f64::from(size.height)))
+    Ok((rays, hits, pixels.angle()))
 }
 
 /// Judges the hits that a preset draws of all pixels. Those that eight times the steps change are told as out of steps.
