@@ -56,6 +56,21 @@ pub fn dither(encoded: [f64; 3], pixel: [u32; 2], levels: f64) -> [f64; 3] {
     encoded.map(|c| c + (bayer_8x8(pixel) - 0.5) / levels)
 }
 
+/// The value of a pixel that nothing shines through, for a target of encoded colour (0), linear colour (1) or radiance (2).
+pub fn displayed(output: i32, radiance: [f64; 3], exposure: f64, pixel: [u32; 2]) -> [f64; 4] {
+    let signal = dither(
+        encode_srgb(super::tone_map::exponential(radiance, exposure)),
+        pixel,
+        255.0,
+    );
+    let [r, g, b] = match output {
+        2 => radiance,
+        1 => decode_srgb(signal),
+        _ => signal,
+    };
+    [r, g, b, 1.0]
+}
+
 /// Weights of four neighbours in a row for a place `x` between the second and the third, by Keys's kernel with a = -1/2.
 pub fn catmull_rom(x: f64) -> [f64; 4] {
     [x + 1.0, x, 1.0 - x, 2.0 - x].map(|d| {

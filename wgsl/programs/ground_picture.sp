@@ -108,27 +108,13 @@ fn lift(@builtin(vertex_index) index: u32, @builtin(instance_index) block: u32) 
 #FRAGMENT{
     #CODE{
 #import veduta::terrain::shading::{ThreeLights, shade_three_lights}
-#import veduta::tone_map::exponential::{exponential}
-#import veduta::post::srgb::{encode_srgb, decode_srgb}
-#import veduta::post::dither::{dither}
+#import veduta::post::display::{displayed}
     }#
     #USE{ VARYING }#
     #CODE{
 override OUTPUT: i32 = 0;
 
 const INVERSE_PI: f32 = 0.31830988618;
-
-// What is written for a radiance.
-fn shown(radiance: vec3<f32>, pixel: vec2<f32>) -> vec4<f32> {
-    if OUTPUT == 2 {
-        return vec4<f32>(radiance, 1.0);
-    }
-    let signal = dither(encode_srgb(exponential(radiance, draw_view.exposure)), vec2<u32>(pixel), 255.0);
-    if OUTPUT == 1 {
-        return vec4<f32>(decode_srgb(signal), 1.0);
-    }
-    return vec4<f32>(signal, 1.0);
-}
 
 // Albedo of dry or wet ground by slope, altitude and the mean of its water.
 fn albedo_of(normal: vec3<f32>, altitude: f32, mean: f32, under: f32) -> vec3<f32> {
@@ -154,7 +140,7 @@ fn draw(in: GroundCorner) -> @location(0) vec4<f32> {
         if water > 2e-3 && water < 1.0 {
             discard;
         }
-        return shown(bed, in.position.xy);
+        return displayed(OUTPUT, bed, draw_view.exposure, vec2<u32>(in.position.xy));
     }
     let up = normalize(in.water_normal);
     let to_eye = normalize(-in.place);
@@ -172,7 +158,7 @@ fn draw(in: GroundCorner) -> @location(0) vec4<f32> {
     if water <= 0.0 {
         discard;
     }
-    return shown(radiance, in.position.xy);
+    return displayed(OUTPUT, radiance, draw_view.exposure, vec2<u32>(in.position.xy));
 }
     }#
 }#

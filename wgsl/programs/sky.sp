@@ -100,9 +100,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::atmosphere::sun_disc::{sun_disc, disc_in_pixel}
 #endif
 #endif
-#import veduta::tone_map::exponential::{exponential}
-#import veduta::post::srgb::{encode_srgb, decode_srgb}
-#import veduta::post::dither::{dither}
+#import veduta::post::display::{displayed}
     }#
     #USE{ VARYING }#
     #CODE{
@@ -258,18 +256,6 @@ fn before(ray_at: vec3<f32>, seen: f32) -> AirLight {
 }
 #endif
 
-// What is written for a radiance.
-fn shown(radiance: vec3<f32>, pixel: vec2<f32>) -> vec4<f32> {
-    if OUTPUT == 2 {
-        return vec4<f32>(radiance, 1.0);
-    }
-    let signal = dither(encode_srgb(exponential(radiance, draw_view.exposure)), vec2<u32>(pixel), 255.0);
-    if OUTPUT == 1 {
-        return vec4<f32>(decode_srgb(signal), 1.0);
-    }
-    return vec4<f32>(signal, 1.0);
-}
-
 #ifdef AERIAL
 #ifdef AERIAL_TARGETS
 struct Layers {
@@ -306,11 +292,11 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
 #endif
     if nothing {
         // The host's picture holds what is in space: its stars shine through the air.
-        return shown((background(dir) + disc(dir, right, down)) * draw_view.sun_irradiance + held.rgb * from_space(dir), in.position.xy);
+        return displayed(OUTPUT, (background(dir) + disc(dir, right, down)) * draw_view.sun_irradiance + held.rgb * from_space(dir), draw_view.exposure, vec2<u32>(in.position.xy));
     }
     let front = before(in.ray, seen);
     let radiance = front.in_scatter * draw_view.sun_irradiance + front.transmittance * held.rgb;
-    return shown(radiance, in.position.xy);
+    return displayed(OUTPUT, radiance, draw_view.exposure, vec2<u32>(in.position.xy));
 }
 #endif
 #else
@@ -332,7 +318,7 @@ fn draw(in: Corner) -> @location(0) vec4<f32> {
     }
 #endif
 #endif
-    return shown(radiance * draw_view.sun_irradiance, in.position.xy);
+    return displayed(OUTPUT, radiance * draw_view.sun_irradiance, draw_view.exposure, vec2<u32>(in.position.xy));
 }
 #endif
     }#

@@ -89,9 +89,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::terrain::orbit::{globe_hit, globe_shadow}
 #import veduta::terrain::material::{Rock, faded_noise, snow_blend}
 #import veduta::terrain::shading::{ThreeLights, shade_rough}
-#import veduta::tone_map::exponential::{exponential}
-#import veduta::post::srgb::{encode_srgb, decode_srgb}
-#import veduta::post::dither::{dither}
+#import veduta::post::display::{displayed}
     }#
     #USE{ VARYING }#
     #CODE{
@@ -108,18 +106,6 @@ const INVERSE_PI: f32 = 0.31830988618;
 struct Shown {
     @location(0) color: vec4<f32>,
     @builtin(frag_depth) depth: f32,
-}
-
-// What is written for a radiance.
-fn shown(radiance: vec3<f32>, pixel: vec2<f32>) -> vec4<f32> {
-    if OUTPUT == 2 {
-        return vec4<f32>(radiance, 1.0);
-    }
-    let signal = dither(encode_srgb(exponential(radiance, draw_view.exposure)), vec2<u32>(pixel), 255.0);
-    if OUTPUT == 1 {
-        return vec4<f32>(decode_srgb(signal), 1.0);
-    }
-    return vec4<f32>(signal, 1.0);
 }
 
 // The lights where the sun has a zenith cosine.
@@ -186,7 +172,7 @@ fn draw(in: Corner) -> Shown {
         discard;
     }
     let linear = max(dot(point, draw_view.forward), 1e-6);
-    return Shown(shown(radiance, in.position.xy), clamp(draw_view.depth_numerator / linear - draw_view.depth_offset, 0.0, 1.0));
+    return Shown(displayed(OUTPUT, radiance, draw_view.exposure, vec2<u32>(in.position.xy)), clamp(draw_view.depth_numerator / linear - draw_view.depth_offset, 0.0, 1.0));
 }
     }#
 }#

@@ -1277,6 +1277,7 @@ pub fn registry() -> Vec<Entry> {
         dither
     );
     same!(list, "post::srgb", "post", post, encode_srgb, decode_srgb);
+    same!(list, "post::display", "post", post, displayed);
     same!(
         list,
         "post::temporal",
