@@ -46,6 +46,20 @@ const RINGS: u32 = 1024;
 /// silhouette, 0.2 0.2 %, 0.25 0.17 % and 0.35 0.12 %, for more steps each.
 const MARGIN: f32 = 0.25;
 
+/// Where rays look for the field itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Searched {
+    /// Nowhere: the last steps from the baked ground have to do.
+    Nowhere,
+    /// Near the baked ground where its texels are wider than pixels.
+    Lens,
+    /// Near the baked ground, and in a wider margin.
+    Everywhere,
+}
+
+/// How near the baked ground that is (texels) for rays that look for it everywhere.
+const WIDE_MARGIN: f32 = 0.5;
+
 /// Where an eye looks, as far as baking is concerned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gaze {
@@ -55,9 +69,9 @@ pub(super) struct Gaze {
     pub near: f64,
     /// Distance at which rays end (m).
     pub far: f64,
-    /// Angle of a pixel (rad), and whether rays look for the field itself where texels are wider.
+    /// Angle of a pixel (rad), and where rays look for the field itself.
     pub pixel_angle: f64,
-    pub searched: bool,
+    pub searched: Searched,
     /// The azimuths that are looked at, from +x towards +z: the first and the extent (rad).
     pub azimuths: [f64; 2],
     /// The light that throws shadows: the unit vector to it, and its angular radius (rad).
@@ -708,10 +722,10 @@ impl Clipmap {
             first: self.first as i32,
             levels: self.levels as i32,
             // A texel is one to two of its distance over the reach wide.
-            margin: if gaze.searched && gaze.pixel_angle * f64::from(reach) < 1.0 {
-                MARGIN
-            } else {
-                0.0
+            margin: match gaze.searched {
+                Searched::Everywhere => WIDE_MARGIN,
+                Searched::Lens if gaze.pixel_angle * f64::from(reach) < 1.0 => MARGIN,
+                _ => 0.0,
             },
         };
         let bytes = clip.to_bytes().to_vec();

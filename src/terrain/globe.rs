@@ -351,6 +351,7 @@ impl<T: Real> Globe<T> {
             top: self.bounds.maximum,
             far: ray.far.min(TerrainRay::FARTHEST_OVER_BALL),
             pixel_angle,
+            share: 0.5,
             least,
             steep: self.bounds.ladder(self.kind()),
             wavelength: self.lattice,

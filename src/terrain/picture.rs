@@ -26,7 +26,7 @@ pub struct GroundPixel {
     pub lit: [f64; 3],
 }
 
-/// Renders what `Terrain` draws with the preset `high`, row by row from the top; `None` where no ground is seen before `far` (m). Hits are found by bracketing, and the
+/// Renders what `Terrain` draws with the preset `high`, row by row from the top; `None` where no ground is seen before `far` (m). Hits are found by bracketing in steps of a twentieth of a footprint, and the
 /// share of the sun by looking along its azimuth for the horizon, both over the field itself in `f64`.
 ///
 /// # Errors
@@ -152,7 +152,7 @@ fn shaded(
             Some(distances) => distances[i],
             None => {
                 field
-                    .ray_hit(land.planet_radius, &ray, angle, 0.02)?
+                    .first_hit(land.planet_radius, &ray, angle, 0.02, 0.05)?
                     .distance
             }
         };

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group, nearest_ground};
+use super::clipmap::{Clipmap, ClipmapOptions, Gaze, Searched, group, nearest_ground};
 use super::field::field_kind;
 use super::globe::Globe;
 use super::globe_rays;
@@ -457,7 +457,7 @@ impl TerrainQuery {
             near: above,
             far: farthest,
             pixel_angle: f64::from(pixel_angle),
-            searched: true,
+            searched: Searched::Lens,
             azimuths: [0.0, std::f64::consts::TAU],
             sun: None,
         };

@@ -101,6 +101,8 @@ pub(super) struct Search {
     /// It ends here (m).
     pub far: f64,
     pub pixel_angle: f64,
+    /// Step at the least, in footprints.
+    pub share: f64,
     /// Least step (m).
     pub least: f64,
     /// No slope is steeper while so many octaves count, of a first one with cells of `wavelength` metres.
@@ -176,7 +178,7 @@ impl Search {
         self.steep[count.clamp(0.0, 16.0) as usize] * (1.0 + 8.0 * self.pixel_angle)
     }
 
-    /// The first distance at which the clearance is gone, by steps of half a footprint, or longer ones where the slope's bound shows the ray clear, and bisection.
+    /// The first distance at which the clearance is gone, by steps of a share of the footprint, or longer ones where the slope's bound shows the ray clear, and bisection.
     ///
     /// # Errors
     /// [`Error::OutOfDomain`] for a least step that is not above 0 and an angle that is below it.
@@ -197,6 +199,7 @@ impl Search {
             top,
             far,
             pixel_angle,
+            share,
             least,
             ..
         } = self;
@@ -229,12 +232,12 @@ impl Search {
                 left = 0.0;
                 continue;
             }
-            let half = 0.5 * pixel_angle * t;
+            let footprint = pixel_angle * t;
             // From here on footprints grow and the ray bends upwards: neither makes it come down faster.
-            let fall = (self.steepest(2.0 * half) * self.level - rise).max(1e-9);
+            let fall = (self.steepest(footprint) * self.level - rise).max(1e-9);
             // Some for what rounding of heights in `f32` may hide.
             let safe = (left - 0.01) / fall;
-            let next = (t + half.max(least).max(safe)).min(far);
+            let next = (t + (share * footprint).max(least).max(safe)).min(far);
             left = clearance(next);
             if left <= 0.0 {
                 let (mut clear, mut below) = (t, next);
@@ -275,6 +278,7 @@ impl<T: Real> Prepared<T> {
             top: bounds.map_or(2e4, |b| b.maximum),
             far: ray.far.min(TerrainRay::FARTHEST),
             pixel_angle,
+            share: 0.5,
             least,
             steep: bounds.map_or([1e30; 17], |b| b.ladder(self.kind())),
             wavelength: self.lattice(),
@@ -295,6 +299,18 @@ impl<T: Real> Prepared<T> {
         pixel_angle: f64,
         least: f64,
     ) -> Result<TerrainHit, Error> {
+        self.first_hit(planet_radius, ray, pixel_angle, least, 0.5)
+    }
+
+    /// [`Prepared::ray_hit`] by steps of another share of the footprint, which is what may be missed.
+    pub(super) fn first_hit(
+        &self,
+        planet_radius: f64,
+        ray: &TerrainRay,
+        pixel_angle: f64,
+        least: f64,
+        share: f64,
+    ) -> Result<TerrainHit, Error> {
         ray.check(0)?;
         if let Kind::Own { .. } = self.kind() {
             return Err(Error::OutOfDomain {
@@ -303,7 +319,10 @@ impl<T: Real> Prepared<T> {
                 domain: "a kind that the processor knows; ray_hits asks the device".to_owned(),
             });
         }
-        let search = self.search(planet_radius, ray, pixel_angle, least);
+        let search = Search {
+            share,
+            ..self.search(planet_radius, ray, pixel_angle, least)
+        };
         let (start, radius) = (search.start, search.radius);
         let eye = self.place(ray.origin);
         let altitude = |t: f64| altitude_along(start, radius, ray.dir[1], t);

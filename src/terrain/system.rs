@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::clipmap::{Clipmap, ClipmapOptions, Gaze, group, nearest_ground};
+use super::clipmap::{Clipmap, ClipmapOptions, Gaze, Searched, group, nearest_ground};
 use super::cloud_shade::{CLOUD_BLOCK, CLOUD_BYTES, CloudShade};
 use super::field::field_kind;
 use super::ground::Prepared;
@@ -77,6 +77,9 @@ pub struct TerrainOptions {
     /// Texels of a side of each level of baked heights: 128, 256, 512 or 1024. A texel is about as wide as a pixel where it is used when this is 3.5 over the angle of a pixel. 0 leaves it to the
     /// preset's CLIP_TEXELS, 512. Where they are finer than these, rays take as many more steps. Nothing comes of it over a ball, where nothing is baked.
     pub texels: u32,
+    /// Whether rays look for the field itself wherever they come near what is baked, and towards the sun over the field, too: pictures are those of `f64` to 60 dB also of ridges, at a multiple of the
+    /// time. Nothing comes of it over a ball, where nothing is baked.
+    pub exact: bool,
     /// Whether a layer of clouds shades the ground, which [`Terrain::set_cloud_shadow`](super::Terrain::set_cloud_shadow) tells. Nothing comes of it over a ball.
     pub cloud_shadows: bool,
 }
@@ -90,6 +93,7 @@ impl Default for TerrainOptions {
             far: 60_000.0,
             sky_sectors: 0,
             texels: 0,
+            exact: false,
             cloud_shadows: false,
         }
     }
@@ -129,8 +133,8 @@ pub(super) struct PlaneTerrain {
     held: [Vec<u8>; 3],
     /// What the program reads of clouds.
     shade: Option<CloudShade>,
-    /// Whether rays look for the field itself where texels are wider than pixels.
-    searched: bool,
+    /// Where rays look for the field itself.
+    searched: Searched,
     /// Whether the view shows any ground.
     seen: bool,
     /// The nearest ground that was looked for last.
@@ -340,7 +344,11 @@ impl PlaneTerrain {
         }
         // Finer texels than the preset's take more steps.
         let finer = (f64::from(texels) / number("CLIP_TEXELS", 512.0)).max(1.0);
-        let steps = (finer * number("CLIP_STEPS", 500.0)).round();
+        let mut steps = (finer * number("CLIP_STEPS", 500.0)).round();
+        let mut searches = number("SEARCH_STEPS", 48.0);
+        if options.exact {
+            (steps, searches) = (4.0 * steps, 4000.0);
+        }
         let clipmap = Clipmap::new(
             device,
             programs,
@@ -351,7 +359,7 @@ impl PlaneTerrain {
                 reach: options.far,
                 width: width as u32,
             },
-            true,
+            !options.exact,
         )?;
         let features: &[&str] = if options.cloud_shadows {
             &["CLOUD_SHADOWS"]
@@ -363,7 +371,8 @@ impl PlaneTerrain {
             ("OUTPUT", output),
             ("CLIP_STEPS", steps),
             ("REFINE_STEPS", number("REFINE_STEPS", 2.0)),
-            ("SEARCH_STEPS", number("SEARCH_STEPS", 48.0)),
+            ("SEARCH_STEPS", searches),
+            ("SUN_STEPS", if options.exact { 20_000.0 } else { 0.0 }),
             ("ROCK_CHEAP", number("TEXTURE_LOW_QUALITY", 0.0)),
             ("SKY_SECTORS", f64::from(options.sky_sectors)),
         ];
@@ -431,7 +440,13 @@ impl PlaneTerrain {
             rock,
             held: Default::default(),
             shade,
-            searched: number("SEARCH_STEPS", 48.0) > 0.0,
+            searched: if options.exact {
+                Searched::Everywhere
+            } else if searches > 0.0 {
+                Searched::Lens
+            } else {
+                Searched::Nowhere
+            },
             seen: true,
             looked: None,
         })
@@ -549,7 +564,7 @@ impl PlaneTerrain {
             azimuths,
             pixel_angle: f64::from(pixel_angle),
             searched: self.searched,
-            sun: (lights.sun != Vec3::ZERO).then(|| {
+            sun: (lights.sun != Vec3::ZERO && self.clipmap.shades().is_some()).then(|| {
                 let to_sun = view.sun.to_light.normalize_or(Vec3::Y).as_dvec3();
                 (to_sun.to_array(), f64::from(view.sun.angular_radius))
             }),
@@ -585,6 +600,8 @@ impl PlaneTerrain {
             snow_noise: m.snow_noise,
             snow_line: m.snow_line,
             sea_albedo: self.land.sea.map_or([0.0; 3], |s| s.albedo),
+            highest: self.clipmap.top() as f32,
+            sun_radius: view.sun.angular_radius.max(1e-6),
             ..Default::default()
         };
         let wavelength = f64::from(m.rock_wavelength);

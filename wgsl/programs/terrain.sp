@@ -34,6 +34,10 @@ struct TerrainView {
     // Height below which no snow lies [m].
     snow_line: f32,
     sea_albedo: vec3<f32>,
+    // No ground stands higher [m].
+    highest: f32,
+    // Angular radius of the sun [rad].
+    sun_radius: f32,
 }
 
 @group(0) @binding(0) var<uniform> draw_view: TerrainView;
@@ -122,8 +126,8 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #import veduta::planet::shell::{altitude_of}
 #import veduta::terrain::clipmap::{Clip, Sweep, sun_share}
 #import veduta::terrain::field::{Field, height_spread}
-#import veduta::terrain::relief::{bare_land_at}
-#import veduta::terrain::refine::{found_hit}
+#import veduta::terrain::relief::{bare_land_at, land_at}
+#import veduta::terrain::refine::{found_hit, field_sun_share}
 #import veduta::terrain::material::{Rock, faded_noise, rock_low_faded, rock_high_faded, snow_blend}
 #import veduta::terrain::shading::{ThreeLights, shade_rough}
 #import veduta::terrain::sky_share::{sky_share}
@@ -158,6 +162,8 @@ override CLIP_STEPS: i32 = 500;
 override REFINE_STEPS: i32 = 2;
 // Most places where the field itself is looked for, where texels are wider than footprints.
 override SEARCH_STEPS: i32 = 48;
+// Most places towards the sun at which the field itself is looked at; 0: what is baked tells its share.
+override SUN_STEPS: i32 = 0;
 // Whether the rock has one fractal instead of four.
 override ROCK_CHEAP: i32 = 0;
 // Sectors in which horizons take light off the sky; 0: none.
@@ -179,7 +185,11 @@ fn draw(in: Corner) -> Shown {
     let is_met = found.distance >= 0.0;
     let point = dir * max(found.distance, 1e-3);
     // A pixel covers more ground the more it slants.
-    let normal = normalize(vec3<f32>(-found.slope.x, 1.0, -found.slope.y));
+    var slant = found.slope;
+    if SUN_STEPS > 0 {
+        slant = land_at(relief, field, FIELD_KIND, point.xz, select(1e30, angle * found.distance, is_met)).slope;
+    }
+    let normal = normalize(vec3<f32>(-slant.x, 1.0, -slant.y));
     let footprint = select(1e30, angle * found.distance / max(-dot(normal, dir), 0.05), is_met);
     // The ground below the sea too, to blend their border over the heights that a footprint holds.
     let ground = bare_land_at(relief, field, FIELD_KIND, point.xz, footprint);
@@ -188,7 +198,12 @@ fn draw(in: Corner) -> Shown {
     let tidal = max(2.24 * height_spread(ground.slope, ground.lost, footprint, left, field.fall), 0.01);
     let land = smoothstep(-tidal, tidal, ground.height - field.sea);
     let altitude = altitude_of(clip.ground_radius, clip.eye_altitude, point);
-    var light = sun_share(heights, shades, wrapping, places, clip, sweep, point.xz);
+    var light = 1.0;
+    if SUN_STEPS > 0 {
+        light = field_sun_share(relief, field, FIELD_KIND, clip.ground_radius, point.xz, max(ground.height, field.sea), footprint, draw_view.to_sun, draw_view.sun_radius, draw_view.highest, draw_view.far, select(0, SUN_STEPS, is_met));
+    } else {
+        light = sun_share(heights, shades, wrapping, places, clip, sweep, point.xz);
+    }
 #ifdef CLOUD_SHADOWS
     light *= cloud_shadow(cloud_tile, cloud_sampler, cloud_layer, point.xz, altitude);
 #endif

@@ -86,7 +86,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 #FRAGMENT{
     #CODE{
 #import veduta::terrain::globe::{Globe, globe_up, globe_at}
-#import veduta::terrain::orbit::{globe_hit, globe_shadow}
+#import veduta::terrain::orbit::{globe_hit, globe_border, globe_shadow}
 #import veduta::terrain::material::{Rock, faded_noise, snow_blend}
 #import veduta::terrain::shading::{ThreeLights, shade_rough}
 #import veduta::post::display::{displayed}
@@ -144,7 +144,8 @@ fn draw(in: Corner) -> Shown {
     let facing = dot(hit.normal, draw_view.to_sun) + sqrt(lost);
     let dusk = -sqrt(2.0 * max(globe.high - globe.low, 0.0) / globe.ground_radius) - draw_view.sun_width;
     let rounds = select(0, GLOBE_STEPS_SHADOW, is_met && facing > 0.0 && mu > dusk);
-    let light = globe_shadow(globe, FIELD_KIND, point, draw_view.to_sun, draw_view.sun_width, footprint, rounds);
+    let blurred = globe_border(up, slopes, draw_view.to_sun, dir, footprint);
+    let light = globe_shadow(globe, FIELD_KIND, point, draw_view.to_sun, draw_view.sun_width, footprint, blurred, rounds);
     let lit = select(0.0, light, mu > dusk);
     // The frame of the place: east, up, and across both.
     let aside = select(vec3<f32>(0.0, 1.0, 0.0), vec3<f32>(1.0, 0.0, 0.0), abs(up.y) > 0.9);

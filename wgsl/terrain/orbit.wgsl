@@ -103,14 +103,31 @@ fn globe_hit(globe: Globe, kind: i32, dir: vec3<f32>, before: f32, far: f32, pix
     return hit;
 }
 
-/// Share of the disc of a light of the angular radius whose tangent is `width` that is seen from a place on the ground of the footprint `footprint`. Crests between steps
-/// that grow with the distance may be passed.
+/// Half the height, in metres across a shadow's border on the ground, over which the clearance of a ray towards a light varies within a pixel of which `dir` is the view and `footprint` the width: the ground's slope
+/// and the light's against each other, along both sides of what the pixel covers. Second, by how much the clearance over level ground of that slope grows towards the light, per metre.
 ///
 /// internal
-fn globe_shadow(globe: Globe, kind: i32, origin: vec3<f32>, to_light: vec3<f32>, width: f32, footprint: f32, max_steps: i32) -> f32 {
+fn globe_border(up: vec3<f32>, slope: vec3<f32>, to_light: vec3<f32>, dir: vec3<f32>, footprint: f32) -> vec2<f32> {
+    let mu = dot(up, to_light);
+    let towards = to_light - mu * up;
+    let level = max(length(towards), 0.05);
+    let change = slope - towards * (clamp(mu / level, 0.0, 4.0) / level);
+    // A pixel covers more ground along the view the more the ground slants.
+    let facing = (dot(slope, dir) - dot(up, dir)) * inverseSqrt(1.0 + dot(slope, slope));
+    let ahead = dir - dot(up, dir) * up;
+    let forth = ahead / max(length(ahead), 1e-3);
+    let along = dot(change, forth) / max(facing, 0.1);
+    let aside = dot(change, cross(up, forth));
+    return vec2<f32>(0.3 * footprint * sqrt(along * along + aside * aside), max(mu - dot(slope, towards), 0.0));
+}
+
+/// Share of the disc of a light of the angular radius whose tangent is `width` that is seen from a place on the ground of the footprint `footprint`, with its [`globe_border`]. Steps grow with the distance
+/// and the clearance.
+///
+/// internal
+fn globe_shadow(globe: Globe, kind: i32, origin: vec3<f32>, to_light: vec3<f32>, width: f32, footprint: f32, border: vec2<f32>, max_steps: i32) -> f32 {
     var least = 1.0;
-    let first = 1.5 * footprint;
-    var t = first;
+    var t = 1.5 * footprint;
     for (var i = 0; i < max_steps; i++) {
         let at = origin + to_light * t;
         let altitude = globe_altitude(globe, at);
@@ -120,13 +137,13 @@ fn globe_shadow(globe: Globe, kind: i32, origin: vec3<f32>, to_light: vec3<f32>,
             break;
         }
         let level = sqrt(max(1.0 - rise * rise, 0.0));
-        let own = max(footprint, 0.06 * t);
+        let own = max(min(footprint, 0.35 * t), 0.04 * t);
         let probe = globe_octaves(globe, kind, globe.cell, globe_frac(globe, at, altitude), up, footprint + 0.5 * width * t, altitude, rise, level, 4.0 * own);
         let early = probe.step >= 4.0 * own;
         let clearance = select(altitude - probe.ground.height, probe.clear, early);
-        // The shadow's border is as wide as the penumbra and the footprint together.
-        least = min(least, clearance / (width * t + 0.35 * footprint));
-        t += max(max(select(0.7 * clearance, 0.0, early), probe.step), own);
+        // The shadow's border is as wide as the penumbra and what varies within the pixel, but no level ground shades itself.
+        least = min(least, clearance / (width * t + min(border.x, 0.5 * border.y * t)));
+        t += max(max(select(1.2 * clearance, 0.0, early), probe.step), own);
     }
     let x = clamp(least, -1.0, 1.0);
     return clamp(0.5 + x * (0.75 - 0.25 * x * x), 0.0, 1.0);

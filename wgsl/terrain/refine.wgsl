@@ -1,5 +1,6 @@
 //! From the baked ground to the field itself, as the pixel's footprint filters it: a last step, or, where texels are wider than footprints, a search of the field wherever a ray comes close to what
 //! is baked.
+//! And the sun's share over the field itself, for pictures that have to be those of double precision.
 //! source   Newton's method; the search: Keinert2014 (steps by the clearance, longer than the steepest slope allows), regula falsi
 //! symbols  t distance along the ray [m] · pixel_angle angle of a pixel [rad], so that the footprint is pixel_angle t
 #define_import_path veduta::terrain::refine
@@ -68,6 +69,8 @@ struct FoundHit {
 
 /// A slope that is rarely exceeded along a ray.
 const SEARCH_STEEP: f32 = 0.8;
+/// A margin of so many texels asks for crests that are a twentieth of a footprint wide.
+const EVERY_CREST: f32 = 0.4;
 
 /// Where a ray from the eye meets the field: over baked heights with so many last steps on the field. Where texels are wider than footprints these do not know the field's crests: there, within the
 /// margin of what is baked, the field itself is looked for in steps of half a footprint or of the clearance over the slopes that are usual, and bracketed; at most `search_steps` times.
@@ -84,7 +87,10 @@ const SEARCH_STEEP: f32 = 0.8;
 /// outside undefined
 /// source  Tevs2008; Keinert2014; Newton's method
 fn found_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture_2d<f32>, places: texture_2d<f32>, relief: texture_2d<f32>, clip: Clip, field: Field, kind: i32, dir: vec3<f32>, far: f32, pixel_angle: f32, max_steps: i32, refine_steps: i32, search_steps: i32) -> FoundHit {
-    let fall = max(SEARCH_STEEP * length(dir.xz) - dir.y, 0.25);
+    let every = clip.margin >= EVERY_CREST;
+    let fall = max(select(SEARCH_STEEP, 4.0, every) * length(dir.xz) - dir.y, 0.25);
+    let share = select(0.5, 0.05, every);
+    let narrow = select(0.6, 0.02, every);
     var near = 0.0;
     var steps = 0;
     var left = select(0, search_steps, clip.margin > 0.0);
@@ -125,7 +131,7 @@ fn found_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture
             }
             if below >= 0.0 && clear >= 0.0 {
                 t = clear + (below - clear) * clamp(clear_by / max(clear_by - below_by, 1e-9), 0.1, 0.9);
-                if below - clear < max(0.6 * footprint, 3e-7 * t + 1e-4) {
+                if below - clear < max(narrow * footprint, 3e-7 * t + 1e-4) {
                     break;
                 }
             } else if below >= 0.0 {
@@ -139,13 +145,13 @@ fn found_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture
                 if t > far || (clearance > clip.margin * hit.spacing && t > start + 2.0 * hit.spacing) {
                     break;
                 }
-                t += max(0.5 * footprint, clearance / fall);
+                t += max(share * footprint, clearance / fall);
             }
         }
         // Within the bracket that it has, also when the steps are used up.
         if below >= 0.0 {
             found.distance = t;
-            most = 0.5 * pixel_angle * t;
+            most = min(narrow, 0.5) * pixel_angle * t;
             last = 1;
             break;
         }
@@ -158,4 +164,42 @@ fn found_hit(heights: texture_2d_array<f32>, wrapping: sampler, sectors: texture
         found.slope = refined.slope;
     }
     return found;
+}
+
+/// Share of the sun's disc above the field towards it, from a place on the ground of a footprint: the highest of the horizon's tangents along the sun's azimuth, looked for by half a footprint or a two-hundredth of the
+/// distance. `limb` is the disc's angular radius, `highest` a height that no ground exceeds.
+///
+/// domain  kind in [0, 7] 1 lin
+/// domain  ground_radius in [3e6, 1e8] m log
+/// domain  at in [-1e5, 1e5] m lin
+/// domain  altitude in [-1e4, 1e4] m lin
+/// domain  footprint in [1e-2, 1e4] m log
+/// domain  to_sun in [-1, 1] 1 lin
+/// domain  limb in [1e-6, 0.1] 1 log
+/// domain  highest in [-1e4, 2e4] m lin
+/// domain  far in [1, 1e6] m log
+/// domain  max_steps in [0, 100000] 1 lin
+/// range   [0, 1] 1
+/// error   1 abs of reference::terrain::soft_shadow
+/// outside undefined
+/// source  ours: as `land_picture`
+fn field_sun_share(relief: texture_2d<f32>, field: Field, kind: i32, ground_radius: f32, at: vec2<f32>, altitude: f32, footprint: f32, to_sun: vec3<f32>, limb: f32, highest: f32, far: f32, max_steps: i32) -> f32 {
+    let radius = ground_radius + altitude;
+    let level = max(length(to_sun.xz), 1e-6);
+    let ahead = to_sun.xz / level;
+    var horizon = -1e3;
+    var d = footprint;
+    for (var i = 0; i < max_steps; i++) {
+        let q = d * (d + 2.0 * radius * to_sun.y);
+        let above = q / (radius + sqrt(max(radius * radius + q, 0.0)));
+        if d >= far || altitude + above >= highest + 0.02 * d {
+            break;
+        }
+        let width = max(footprint, 0.01 * d);
+        let rise = land_at(relief, field, kind, at + ahead * d, width).height - altitude;
+        horizon = max(horizon, rise / d - 0.5 * d / radius);
+        d += 0.5 * width;
+    }
+    let x = clamp((to_sun.y - horizon * level) * inverseSqrt(1.0 + horizon * horizon) / limb, -1.0, 1.0);
+    return 0.5 + x * (0.75 - 0.25 * x * x);
 }

@@ -114,6 +114,10 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
         "a_long_lens_meets_crests_that_are_finer_than_texels",
     ),
     (
+        "veduta::terrain::refine::field_sun_share",
+        "pictures_far_from_the_origin_are_those_of_double_precision",
+    ),
+    (
         "veduta::terrain::refine::refined_hit",
         "rays_over_baked_heights_meet_the_field",
     ),
