@@ -141,6 +141,7 @@ impl Drawer {
             size: [size.width, size.height],
             bound: f32::INFINITY,
             sharp: preset != "low",
+            fixed: true,
             has_empty: true,
             ..TemporalOptions::of([size.width, size.height])
         };
