@@ -112,6 +112,7 @@ impl TerrainOptions {
         TemporalOptions {
             bound: f32::INFINITY,
             sharp: name != "low",
+            fixed: true,
             has_empty: true,
             ..TemporalOptions::of_share(size, share)
         }

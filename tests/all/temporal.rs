@@ -502,3 +502,95 @@ fn a_view_that_is_told_stands_for_the_last_one() {
     let truth = truth(&at(11.0), &walls);
     assert!(apart(&wrong, &truth) > 1.2 * apart(&own, &truth));
 }
+
+/// A slope before a far wall, as rough as ground: posts thinner than samples lie apart, so that frames show and miss them by turns.
+fn posts(eye: DVec3, dir: DVec3) -> ([f64; 3], f64) {
+    let wall = eye + dir * ((-40.0 - eye.z) / dir.z);
+    let post = eye + dir * ((-30.0 - eye.z) / dir.z);
+    if (post.x / 1.7).rem_euclid(1.0) < 0.4 {
+        ([0.9, 0.7, 0.5], eye.z + 30.0)
+    } else {
+        let light = 0.2 + 0.1 * (2.0 * wall.y).sin();
+        ([light, light, light], eye.z + 40.0)
+    }
+}
+
+#[test]
+fn what_samples_miss_is_kept_where_only_the_eye_moves() {
+    let aspect = SIZE[0] as f32 / SIZE[1] as f32;
+    for (way, least) in [(0.0, 0.8), (0.003, 0.85)] {
+        let flight = |fixed: bool| {
+            let mut host = Host::new(TemporalOptions {
+                taken: [17, 10],
+                frames: 16.0,
+                sharp: false,
+                fixed,
+                ..still(TemporalOptions::of(SIZE))
+            });
+            let mut sums = [0.0; 2];
+            let mut before: Option<Vec<[f64; 3]>> = None;
+            for frame in 0..60 {
+                let mut view = view();
+                view.eye = view
+                    .eye
+                    .moved_by(DVec3::new(way * f64::from(frame), 0.0, 0.0));
+                view.look(0.0, 0.0, 1.0, aspect);
+                let shown = host.frame(&view, &posts);
+                if frame >= 30 {
+                    sums[0] += apart(&shown, &truth(&view, &posts)) / 30.0;
+                    sums[1] += before.map_or(0.0, |old| apart(&shown, &old)) / 30.0;
+                }
+                before = Some(shown);
+            }
+            sums
+        };
+        let [left, kept] = [false, true].map(flight);
+        println!("{way} m a frame: error {left:?} -> {kept:?}");
+        assert!(
+            kept[0] < least * left[0] && kept[1] < 0.6 * left[1],
+            "{way}: {left:?} {kept:?}"
+        );
+    }
+}
+
+/// What the eye's own way uncovers keeps nothing of what hid it; where things may move, what was beside an edge trails behind it.
+#[test]
+fn what_the_way_uncovers_is_left_where_only_the_eye_moves() {
+    let aspect = SIZE[0] as f32 / SIZE[1] as f32;
+    // A bright edge 4 m away before a dark wall.
+    let edge = |eye: DVec3, dir: DVec3| {
+        let near = eye + dir * ((-4.0 - eye.z) / dir.z);
+        if near.x < 0.0 {
+            ([5.0; 3], eye.z + 4.0)
+        } else {
+            ([0.25; 3], eye.z + 40.0)
+        }
+    };
+    // The edge moves by 0.9 pixels a frame to the left.
+    let step = 0.9 * 4.0 * 2.0 * 0.5_f64.tan() / f64::from(SIZE[1]);
+    let trail = |fixed: bool| {
+        let mut host = Host::new(TemporalOptions {
+            fixed,
+            ..still(TemporalOptions::of(SIZE))
+        });
+        let mut view = view();
+        view.look(0.0, 0.0, 1.0, aspect);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for frame in 0..24 {
+            let shown = host.frame(&view, &edge);
+            let border = f64::from(SIZE[0]) / 2.0 - 0.9 * f64::from(frame);
+            for (k, color) in shown.iter().enumerate() {
+                let away = f64::from(k as u32 % SIZE[0]) + 0.5 - border;
+                if frame >= 12 && (2.5..8.0).contains(&away) {
+                    sum += (color[0] - 0.25).abs();
+                    count += 1.0;
+                }
+            }
+            view.eye = view.eye.moved_by(DVec3::new(step, 0.0, 0.0));
+        }
+        sum / count
+    };
+    let [left, kept] = [false, true].map(trail);
+    println!("behind the edge: {left} -> {kept}");
+    assert!(kept < 0.02 && kept < 0.1 * left, "{left} {kept}");
+}

@@ -86,6 +86,8 @@ override TEMPORAL_SHARP: i32 = 1;
 override TEMPORAL_STILL: i32 = 0;
 // Whether samples lie so far apart that only the nearest tells of a pixel.
 override TEMPORAL_SPARSE: i32 = 0;
+// Whether nothing moves but the eye.
+override TEMPORAL_FIXED: i32 = 0;
 
 // Four texels of a history around a corner, by channel, in the order of gathers.
 struct Four {
@@ -172,8 +174,8 @@ fn resolve(@builtin(position) position: vec4<f32>) -> Joined {
     var inverse = vec4<f32>(0.0);
     var most_depth = 0.0;
     var least_depth = 0.0;
-    // Samples that are far apart do not tell of what is finer for an eye that moves; it is left to the four around.
-    if TEMPORAL_SPARSE != 0 && TEMPORAL_STILL == 0 {
+    // Samples that are far apart do not tell of what is finer for an eye that moves, and need not where nothing moves at all; it is left to the four around.
+    if TEMPORAL_SPARSE != 0 && (TEMPORAL_STILL == 0 || TEMPORAL_FIXED != 0) {
         inverse = textureGather(depths, nearest, corner_one + sample);
         most_depth = most_of(inverse);
         least_depth = least_of(inverse);
@@ -207,7 +209,8 @@ fn resolve(@builtin(position) position: vec4<f32>) -> Joined {
         let ba = textureLoad(history_ba, id, 0).x;
         old = four_decoded(vec4<u32>(rg & 0xffffu, rg >> 16u, ba & 0xffffu, ba >> 16u));
         let kept = four_decoded(vec4<u32>(there & 0xffffu, there >> 16u, 0u, 0u));
-        known = select(0.0, 1.0, kept.x >= 0.9 * far && kept.x <= 1.1 * near + 1e-9);
+        // Where nothing moves samples may miss what is seen here, but nothing else has come to be seen.
+        known = select(0.0, 1.0, TEMPORAL_FIXED != 0 || (kept.x >= 0.9 * far && kept.x <= 1.1 * near + 1e-9));
         count = kept.y;
     } else {
         let clip = vec2<f32>(2.0 * at.x - 1.0, 1.0 - 2.0 * at.y);
@@ -229,7 +232,14 @@ fn resolve(@builtin(position) position: vec4<f32>) -> Joined {
         let counts = four_decoded(places >> vec4<u32>(16u));
         let linear = vec4<f32>((1.0 - share.x) * share.y, share.x * share.y, share.x * (1.0 - share.y), (1.0 - share.x) * (1.0 - share.y));
         let fits = vec4<f32>(stood >= vec4<f32>(0.9 * by * far)) * vec4<f32>(stood <= vec4<f32>(1.1 * by * near + 1e-9));
-        let valid = linear * fits;
+        var found = fits;
+        if TEMPORAL_FIXED != 0 {
+            // Where only the eye moves, what stood at another distance is something else once the two move apart: by a quarter of a pixel in a frame.
+            let passing = vec2<f32>(temporal.before_x.w, -temporal.before_y.w) - (2.0 * was - 1.0) * temporal.before_w.w;
+            let pixels = 0.5 * by * length(passing * size);
+            found = vec4<f32>(abs(stood - by * own) * pixels < vec4<f32>(0.25 * by));
+        }
+        let valid = linear * found;
         known = dot(valid, vec4<f32>(1.0));
         let by_known = 1.0 / max(known, 1e-6);
         // Gathers give (0, 1), (1, 1), (1, 0), (0, 0).
@@ -273,8 +283,9 @@ fn resolve(@builtin(position) position: vec4<f32>) -> Joined {
     }
     // What moves is read between pixels in every frame, and blurs; it counts for less.
     count = select(0.0, min(count, max(temporal.frames / (1.0 + 8.0 * moved), min(temporal.frames, 2.0))), inside && known > 0.01);
-    // Nor is it read for long without a sample: a far one is better then.
-    let counted = min(max(weight, 0.4 * min(moved, 1.0)), 1.0);
+    // Nor is it read for long without a sample: a far one is better then, though not for what hardly moves and keeps its history.
+    let least = select(min(moved, 1.0), clamp(2.0 * moved - 1.0, 0.0, 1.0), TEMPORAL_FIXED != 0);
+    let counted = min(max(weight, 0.4 * least), 1.0);
     let mixed = mix(old, now, counted / (count + counted));
     let result = select(mixed, now, count == 0.0);
     let words = pcg_3d(vec3<u32>(id, temporal.frame));

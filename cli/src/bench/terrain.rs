@@ -84,13 +84,26 @@ pub struct Line {
     pub hits: HitErrors,
 }
 
-/// Changes from frame to frame that motion does not explain: of thesis and of the presets, in 8-bit steps.
+/// Changes from frame to frame of a flight, in 8-bit steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Changes {
+    /// Mean difference of a picture's change from that of its converged picture.
+    pub unexplained: f64,
+    /// Mean change of what is seen in both frames, followed by its depth.
+    pub followed: f64,
+    /// The same of the converged picture.
+    pub truth_followed: f64,
+    /// The pictures against their converged ones, mean over the frames (dB).
+    pub psnr: f64,
+}
+
+/// Changes in a flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flicker {
-    /// Of `thesis`.
-    pub thesis: f64,
-    /// Of each preset.
-    pub presets: Vec<f64>,
+    /// By what is drawn: `thesis`, and presets joined and alone.
+    pub rows: Vec<(String, Changes)>,
+    /// Mean way of what is seen in both frames (pixels a frame), and its share of the ground.
+    pub motion: [f64; 2],
 }
 
 /// What was measured.
@@ -799,8 +812,135 @@ fn unexplained(frames: &[(Vec<u8>, Vec<u8>)]) -> f64 {
     sum / count.max(1) as f64
 }
 
-/// A flight with V01's eye and sun, at half the size.
-fn flicker(bench: &Bench, frames: usize) -> Result<Flicker, CliError> {
+/// A frame of the flight: its view, and the distances along its axis by pixel, infinite where no ground is.
+struct Seen {
+    view: View,
+    size: Size,
+    distances: Vec<f64>,
+}
+
+impl Seen {
+    /// Of a drawn picture of whole times as many pixels: those of the samples next to the pixels' middles.
+    fn of(bench: &Bench, drawer: &Drawer, view: &View, size: Size) -> Result<Seen, CliError> {
+        let [from, scale] = [view.projection.w_axis.z, view.projection.z_axis.z].map(f64::from);
+        let bytes = bench.gpu.read_texture(drawer.depth.texture())?;
+        let by = drawer.size.width / size.width;
+        let mut distances = Vec::new();
+        for y in 0..size.height {
+            for x in 0..size.width {
+                let k = ((by * y + by / 2) * drawer.size.width + by * x + by / 2) as usize;
+                let depth = bytes[4 * k..4 * k + 4]
+                    .try_into()
+                    .map_or(0.0, f32::from_le_bytes);
+                distances.push(if depth > 0.0 {
+                    from / (f64::from(depth) + scale)
+                } else {
+                    f64::INFINITY
+                });
+            }
+        }
+        Ok(Seen {
+            view: *view,
+            size,
+            distances,
+        })
+    }
+
+    /// Where what a pixel shows was in another frame's picture [pixels, from the middle of the first one], if it shows ground and the other frame does there, at no more than a tenth
+    /// nearer or farther.
+    fn found_in(&self, other: &Seen, pixel: usize) -> Option<[f64; 2]> {
+        let distance = self.distances[pixel];
+        if !distance.is_finite() {
+            return None;
+        }
+        let [width, height] = [self.size.width, self.size.height].map(f64::from);
+        let [middle, right, up] = self.view.rays().ok()?.map(|v| v.as_dvec3());
+        let columns = self.size.width as usize;
+        let x = 2.0 * ((pixel % columns) as f64 + 0.5) / width - 1.0;
+        let y = 1.0 - 2.0 * ((pixel / columns) as f64 + 0.5) / height;
+        let forward = self.view.world_from_view.z_axis.truncate().as_dvec3() * -1.0;
+        let ray = middle + x * right + y * up;
+        let point = ray * (distance / ray.dot(forward)) + self.view.eye.relative_to(other.view.eye);
+        let back = other.view.world_from_view.as_dmat4().inverse();
+        let clip = other.view.projection.as_dmat4() * back.transform_vector3(point).extend(1.0);
+        let at = [
+            (0.5 + 0.5 * clip.x / clip.w) * width - 0.5,
+            (0.5 - 0.5 * clip.y / clip.w) * height - 0.5,
+        ];
+        let inside = clip.w > 0.0
+            && (0.0..=width - 1.0).contains(&at[0])
+            && (0.0..=height - 1.0).contains(&at[1]);
+        if !inside {
+            return None;
+        }
+        let there = corners(at, columns).all(|(k, _)| {
+            let ratio = other.distances[k] / clip.w;
+            (0.9..=1.1).contains(&ratio)
+        });
+        there.then_some(at)
+    }
+}
+
+/// The four pixels around a place and how much they count, by a line along both axes.
+fn corners([x, y]: [f64; 2], columns: usize) -> impl Iterator<Item = (usize, f64)> {
+    let (left, top) = (x.floor(), y.floor());
+    let (share_x, share_y) = (x - left, y - top);
+    let first = top as usize * columns + left as usize;
+    [
+        (first, (1.0 - share_x) * (1.0 - share_y)),
+        (first + 1, share_x * (1.0 - share_y)),
+        (first + columns, (1.0 - share_x) * share_y),
+        (first + columns + 1, share_x * share_y),
+    ]
+    .into_iter()
+    // On the last row or column there is nothing beyond.
+    .filter(|(_, share)| *share > 0.0)
+}
+
+/// Mean change between frames of what is seen in both, and its mean way (pixels) and share of the ground.
+fn followed<'a>(frames: impl Iterator<Item = (&'a [u8], &'a Seen)>) -> [f64; 3] {
+    let (mut change, mut way, mut count, mut ground) = (0.0, 0.0, 0_usize, 0_usize);
+    let mut before: Option<(&[u8], &Seen)> = None;
+    for (shown, seen) in frames {
+        if let Some((old, was)) = before {
+            let columns = seen.size.width as usize;
+            for pixel in 0..seen.distances.len() {
+                ground += usize::from(seen.distances[pixel].is_finite());
+                let Some(at) = seen.found_in(was, pixel) else {
+                    continue;
+                };
+                for channel in 0..3 {
+                    let there: f64 = corners(at, columns)
+                        .map(|(k, share)| share * f64::from(old[3 * k + channel]))
+                        .sum();
+                    change += (f64::from(shown[3 * pixel + channel]) - there).abs() / 3.0;
+                }
+                way += (at[0] - (pixel % columns) as f64).hypot(at[1] - (pixel / columns) as f64);
+                count += 1;
+            }
+        }
+        before = Some((shown, seen));
+    }
+    let by = 1.0 / count.max(1) as f64;
+    [change * by, way * by, count as f64 / ground.max(1) as f64]
+}
+
+impl Changes {
+    /// Of frames and their converged ones.
+    fn of(frames: &[(Vec<u8>, Vec<u8>)], seen: &[Seen]) -> Changes {
+        let both = || frames.iter().zip(seen);
+        Changes {
+            unexplained: unexplained(frames),
+            followed: followed(both().map(|((shown, _), s)| (shown.as_slice(), s)))[0],
+            truth_followed: followed(both().map(|((_, truth), s)| (truth.as_slice(), s)))[0],
+            psnr: average(&frames.iter().map(|(p, t)| psnr(p, t)).collect::<Vec<_>>()),
+        }
+    }
+}
+
+/// A flight with V01's eye and sun, at half the size, of `thesis` and the presets, or of those that are named.
+fn flicker(bench: &Bench, frames: usize, of: &[String]) -> Result<Flicker, CliError> {
+    let named = |p: &&str| of.is_empty() || of.iter().any(|o| o == p);
     let small = Size {
         width: bench.size.width / 2,
         height: bench.size.height / 2,
@@ -812,55 +952,147 @@ fn flicker(bench: &Bench, frames: usize) -> Result<Flicker, CliError> {
     let mut view = job.view(0.0, small)?;
     view.look(0.0, -0.1, 60_f32.to_radians(), small.aspect() as f32);
     let exposure = f64::from(view.exposure);
-    let mut renderers = Vec::new();
-    for size in [small, larger(small, samples)] {
-        renderers.push(Renderer::new(
-            &bench.gpu,
-            job.catalog.set(),
-            &job.options,
-            size,
-            Output::Linear,
-        )?);
-    }
-    let mut shown = Vec::new();
-    for frame in 0..frames {
-        let view = flown(&field, &view, frame);
-        let mut both = Vec::new();
-        for (renderer, by) in renderers.iter_mut().zip([1, samples]) {
-            renderer.draw(&view, Tiling::Adaptive, &mut |_| {})?;
-            let rgb: Vec<f32> = renderer
-                .read_rgba32()?
-                .chunks_exact(4)
-                .flat_map(|p| [p[0], p[1], p[2]])
-                .collect();
-            let size = larger(small, by);
-            let picture = Picture::new(size.width as usize, size.height as usize, rgb)?;
-            both.push(picture.averaged(by as usize)?.display(exposure));
-        }
-        let truth = both.pop().unwrap_or_default();
-        shown.push((both.pop().unwrap_or_default(), truth));
-    }
-    let thesis = unexplained(&shown);
-    let mut presets = Vec::new();
+    let mut seen = Vec::new();
+    let mut rows = Vec::new();
     for preset in PRESETS {
+        let wanted = named(&preset);
+        if !wanted && preset != PRESETS[0] {
+            continue;
+        }
         // As fine for its pixels as it is by default for those of the size that is measured.
         let texels = 256;
-        let mut once = Drawer::joining(bench, set, preset, small, texels)?;
+        let mut drawers = [
+            Drawer::joining(bench, set, preset, small, texels)?,
+            Drawer::new(bench, set, preset, small, texels)?,
+        ];
         let mut fine = Drawer::new(bench, set, preset, larger(small, samples), 1024)?;
+        let mut shown = [Vec::new(), Vec::new()];
+        for frame in 0..frames {
+            let view = flown(&field, &view, frame);
+            fine.frame(bench, &view)?;
+            // All are followed by the ground of the first.
+            if preset == PRESETS[0] {
+                seen.push(Seen::of(bench, &fine, &view, small)?);
+            }
+            if !wanted {
+                continue;
+            }
+            let truth = fine.read(bench)?.0.averaged(samples as usize)?;
+            for (drawer, shown) in drawers.iter_mut().zip(&mut shown) {
+                drawer.frame(bench, &view)?;
+                shown.push((
+                    drawer.read(bench)?.0.display(exposure),
+                    truth.display(exposure),
+                ));
+            }
+        }
+        if wanted {
+            for (name, shown) in [
+                format!("`{preset}` joined from {}", part(preset)),
+                format!("`{preset}` alone"),
+            ]
+            .into_iter()
+            .zip(&shown)
+            {
+                rows.push((name, Changes::of(shown, &seen)));
+            }
+        }
+    }
+    if named(&"thesis") {
+        let mut renderers = Vec::new();
+        for size in [small, larger(small, samples)] {
+            renderers.push(Renderer::new(
+                &bench.gpu,
+                job.catalog.set(),
+                &job.options,
+                size,
+                Output::Linear,
+            )?);
+        }
         let mut shown = Vec::new();
         for frame in 0..frames {
             let view = flown(&field, &view, frame);
-            once.frame(bench, &view)?;
-            fine.frame(bench, &view)?;
-            let truth = fine.read(bench)?.0.averaged(samples as usize)?;
-            shown.push((
-                once.read(bench)?.0.display(exposure),
-                truth.display(exposure),
-            ));
+            let mut both = Vec::new();
+            for (renderer, by) in renderers.iter_mut().zip([1, samples]) {
+                renderer.draw(&view, Tiling::Adaptive, &mut |_| {})?;
+                let rgb: Vec<f32> = renderer
+                    .read_rgba32()?
+                    .chunks_exact(4)
+                    .flat_map(|p| [p[0], p[1], p[2]])
+                    .collect();
+                let size = larger(small, by);
+                let picture = Picture::new(size.width as usize, size.height as usize, rgb)?;
+                both.push(picture.averaged(by as usize)?.display(exposure));
+            }
+            let truth = both.pop().unwrap_or_default();
+            shown.push((both.pop().unwrap_or_default(), truth));
         }
-        presets.push(unexplained(&shown));
+        rows.insert(0, ("`thesis`".to_owned(), Changes::of(&shown, &seen)));
     }
-    Ok(Flicker { thesis, presets })
+    let black = vec![0; 3 * (small.width * small.height) as usize];
+    let [_, way, share] = followed(seen.iter().map(|s| (black.as_slice(), s)));
+    Ok(Flicker {
+        rows,
+        motion: [way, share],
+    })
+}
+
+/// Changes in the flight, in words and a table.
+fn flicker_rows(flicker: &Flicker) -> String {
+    let head = [
+        "",
+        "unexplained",
+        "/ `thesis`",
+        "followed",
+        "/ `thesis`",
+        "followed, converged",
+        "[dB]",
+    ];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let thesis = flicker
+        .rows
+        .iter()
+        .find(|(name, _)| name == "`thesis`")
+        .map(|(_, c)| *c);
+    let over = |value: f64, of: &dyn Fn(&Changes) -> f64| {
+        thesis
+            .as_ref()
+            .map_or(String::new(), |t| format!("{:.2}", value / of(t)))
+    };
+    for (name, c) in &flicker.rows {
+        rows.push(vec![
+            name.clone(),
+            format!("{:.2}", c.unexplained),
+            over(c.unexplained, &|t| t.unexplained),
+            format!("{:.2}", c.followed),
+            over(c.followed, &|t| t.followed),
+            format!("{:.2}", c.truth_followed),
+            format!("{:.1}", c.psnr),
+        ]);
+    }
+    format!(
+        "In a flight from V01's place, level with a view 6 degrees down (half the size, converged pictures of {SAMPLES} x {SAMPLES} samples), in steps of 8 bits. `unexplained`: mean change from frame to\n\
+         frame less that of the converged frames, over the whole picture, so that what is blurred counts wherever converged frames change, and they change by more than motion. `followed`: mean\n\
+         change of the ground that is seen in both frames, followed by its depth ({:.2} pixels a frame; {:.1} % of the ground is), which is what flickers; the converged frames' own beside it. The last\n\
+         column is the pictures' mean sharpness in the flight, against their converged ones.\n\n{}",
+        flicker.motion[0],
+        100.0 * flicker.motion[1],
+        table(&rows),
+    )
+}
+
+/// Changes in a flight of `thesis` and the presets, or of those that are named: nothing else is measured.
+///
+/// # Errors
+/// As [`run`].
+pub fn changes(
+    bench: &Bench,
+    plan: &Plan,
+    of: &[String],
+    progress: &mut dyn FnMut(&str),
+) -> Result<String, CliError> {
+    progress("flight");
+    Ok(flicker_rows(&flicker(bench, plan.frames, of)?))
 }
 
 /// Measures every view.
@@ -875,7 +1107,7 @@ pub fn run(bench: &Bench, plan: &Plan, progress: &mut dyn FnMut(&str)) -> Result
     }
     let flicker = if plan.frames > 1 {
         progress("flight");
-        Some(flicker(bench, plan.frames)?)
+        Some(flicker(bench, plan.frames, &[])?)
     } else {
         None
     };
@@ -989,15 +1221,9 @@ pub fn markdown(bench: &Bench, report: &Report, command: &str) -> String {
         .collect();
     let hits = hit_rows(report.lines.iter().map(|l| (l.view.as_str(), &l.hits)));
     let flight = report.flicker.as_ref().map_or(String::new(), |f| {
-        let list: Vec<String> = PRESETS
-            .iter()
-            .zip(&f.presets)
-            .map(|(p, v)| format!("`{p}` {v:.2} ({:.2} of it)", v / f.thesis))
-            .collect();
         format!(
-            "\n## Changes that motion does not explain\n\nMean change from frame to frame of a flight from V01's place, level with a view 6 degrees down, less that of\nthe converged frames (half the size, {SAMPLES} x {SAMPLES} samples), in steps of 8 bits: `thesis` {:.2}, {}.\n",
-            f.thesis,
-            list.join(", "),
+            "\n## Changes that motion does not explain\n\n{}",
+            flicker_rows(f)
         )
     });
     let bakes: Vec<String> = PRESETS
@@ -1068,7 +1294,20 @@ pub fn to_json(bench: &Bench, report: &Report, command: &str) -> serde_json::Val
         .collect::<Vec<_>>()
         .into();
     if let Some(f) = &report.flicker {
-        document["unexplained_change"] = json!({ "thesis": f.thesis, "presets": f.presets });
+        document["changes"] = f
+            .rows
+            .iter()
+            .map(|(name, c)| {
+                json!({
+                    "of": name,
+                    "unexplained": c.unexplained,
+                    "followed": c.followed,
+                    "truth_followed": c.truth_followed,
+                    "psnr": c.psnr,
+                })
+            })
+            .collect::<Vec<_>>()
+            .into();
     }
     document
 }

@@ -75,6 +75,9 @@ pub struct BenchArgs {
     /// Of the terrain only what frames cost, standing and flying and by their parts, and how sharp they are
     #[arg(long, conflicts_with = "hits")]
     pub costs: bool,
+    /// Of the terrain only changes from frame to frame of a flight, of `thesis` and the presets or of those of them that --of names
+    #[arg(long, conflicts_with_all = ["hits", "costs", "views"])]
+    pub changes: bool,
     /// Seconds of the flight of chapter 6 [default: 60]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     pub seconds: Option<u32>,
@@ -141,6 +144,9 @@ impl BenchArgs {
         }
         if self.costs {
             line += " --costs";
+        }
+        if self.changes {
+            line += " --changes";
         }
         for set in &self.sets {
             line += &format!(" --set {set}");
@@ -222,8 +228,9 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
         (
             "--of",
             as_given(&args.of),
-            others(&[Subject::Presets]) && !(args.costs && subject == Subject::Terrain),
-            "left out, or the subject `presets`, or `terrain` with --costs",
+            others(&[Subject::Presets])
+                && !((args.costs || args.changes) && subject == Subject::Terrain),
+            "left out, or the subject `presets`, or `terrain` with --costs or --changes",
         ),
         (
             "--hits",
@@ -234,6 +241,12 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
         (
             "--costs",
             args.costs.then(|| "given".to_owned()),
+            others(&[Subject::Terrain]),
+            "left out, or the subject `terrain`",
+        ),
+        (
+            "--changes",
+            args.changes.then(|| "given".to_owned()),
             others(&[Subject::Terrain]),
             "left out, or the subject `terrain`",
         ),
@@ -382,9 +395,11 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 rounds: rounds.least,
                 frames: if args.views.is_empty() { 60 } else { 0 },
             };
-            if args.hits || args.costs {
+            if args.hits || args.costs || args.changes {
                 let text = if args.hits {
                     terrain::hits(&bench, &plan, &mut progress)?
+                } else if args.changes {
+                    terrain::changes(&bench, &plan, &args.of, &mut progress)?
                 } else {
                     terrain::costs(&bench, &plan, &args.of, &mut progress)?
                 };
