@@ -14,9 +14,6 @@ use crate::programs::blocks::{Field as FieldBlock, Rock as RockBlock, TerrainVie
 use crate::settings::{Preset, Settings};
 use crate::view::{View, WorldPos};
 
-/// Columns of the picture.
-const COLUMNS: u32 = 16;
-
 /// Irradiances on the ground, in the picture's own unit. A host that has an atmosphere takes them [from it](TerrainLights::from_sky).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TerrainLights {
@@ -600,7 +597,7 @@ impl PlaneTerrain {
         Ok(work)
     }
 
-    /// Draws into the host's pass: tiles of the picture, without those above the ground. From above all ground a view that looks up draws nothing.
+    /// Draws into the host's pass: one triangle over the part of the picture below the highest ground that it shows. From above all ground a view that looks up draws nothing.
     pub fn draw_opaque(&self, pass: &mut wgpu::RenderPass<'_>) -> Work {
         if !self.seen {
             return Work::default();
@@ -610,7 +607,7 @@ impl PlaneTerrain {
         for (index, group) in (0..).zip(self.groups.iter().chain(shade)) {
             pass.set_bind_group(index, group, &[]);
         }
-        pass.draw(0..COLUMNS * 6, 0..1);
+        pass.draw(0..3, 0..1);
         Work {
             draws: 1,
             ..Work::default()
