@@ -126,9 +126,15 @@ impl Looked {
     /// The same for an eye that has hardly moved, or turned by no more than samples are shifted in few pixels: nearer by as much as it has moved.
     fn seen_near(&self, eye: WorldPos, rays: [Vec3; 3]) -> Option<(f64, Option<[f64; 2]>)> {
         let moved = eye.relative_to(self.eye).length();
+        // Of a picture that is higher than it is wide its width counts.
+        let least = self
+            .rays
+            .iter()
+            .map(|ray| ray.length())
+            .fold(f32::MAX, f32::min);
         let turned = (0..3).any(|k| {
             let off = (rays[k] - self.rays[k]).length();
-            off > 0.06 * self.rays[0].length().min(self.rays[2].length())
+            off > 0.06 * least
         });
         if turned || moved.is_nan() || moved > 0.05 * self.nearest {
             return None;
@@ -695,6 +701,15 @@ mod tests {
         let turned = |by: f32| rays.map(|v| glam::Mat3::from_rotation_y(by) * v);
         assert!(looked.seen_near(eye, turned(0.005)).is_some());
         assert!(looked.seen_near(eye, turned(0.06)).is_none());
+        // A fifth of its half width shows other ground, however high a picture is.
+        let upright = [rays[0], 0.1 * Vec3::X, 0.9 * Vec3::Y];
+        let narrow = Looked {
+            rays: upright,
+            ..looked
+        };
+        let aside = |by: f32| [upright[0] + by * Vec3::X, upright[1], upright[2]];
+        assert!(narrow.seen_near(eye, aside(0.005)).is_some());
+        assert!(narrow.seen_near(eye, aside(0.02)).is_none());
         let farther = [rays[0], 0.5 * rays[1], 0.5 * rays[2]];
         assert!(looked.seen_near(eye, farther).is_none());
     }
