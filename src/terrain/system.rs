@@ -16,9 +16,6 @@ use crate::settings::{Preset, Settings};
 use crate::temporal::TemporalOptions;
 use crate::view::{View, WorldPos};
 
-/// Columns of the picture.
-const COLUMNS: u32 = 16;
-
 /// Irradiances on the ground, in the picture's own unit. A host that has an atmosphere takes them [from it](TerrainLights::from_sky).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TerrainLights {
@@ -155,9 +152,15 @@ impl Looked {
     /// The same for an eye that has hardly moved, or turned by no more than samples are shifted in few pixels: nearer by as much as it has moved.
     fn seen_near(&self, eye: WorldPos, rays: [Vec3; 3]) -> Option<(f64, Option<[f64; 2]>)> {
         let moved = eye.relative_to(self.eye).length();
+        // Of a picture that is higher than it is wide its width counts.
+        let least = self
+            .rays
+            .iter()
+            .map(|ray| ray.length())
+            .fold(f32::MAX, f32::min);
         let turned = (0..3).any(|k| {
             let off = (rays[k] - self.rays[k]).length();
-            off > 0.06 * self.rays[0].length().min(self.rays[2].length())
+            off > 0.06 * least
         });
         if turned || moved.is_nan() || moved > 0.05 * self.nearest {
             return None;
@@ -638,7 +641,7 @@ impl PlaneTerrain {
         Ok(work)
     }
 
-    /// Draws into the host's pass: tiles of the picture, without those above the ground. From above all ground a view that looks up draws nothing.
+    /// Draws into the host's pass: one triangle over the part of the picture below the highest ground that it shows. From above all ground a view that looks up draws nothing.
     pub fn draw_opaque(&self, pass: &mut wgpu::RenderPass<'_>) -> Work {
         if !self.seen {
             return Work::default();
@@ -648,7 +651,7 @@ impl PlaneTerrain {
         for (index, group) in (0..).zip(self.groups.iter().chain(shade)) {
             pass.set_bind_group(index, group, &[]);
         }
-        pass.draw(0..COLUMNS * 6, 0..1);
+        pass.draw(0..3, 0..1);
         Work {
             draws: 1,
             ..Work::default()
@@ -736,6 +739,15 @@ mod tests {
         let turned = |by: f32| rays.map(|v| glam::Mat3::from_rotation_y(by) * v);
         assert!(looked.seen_near(eye, turned(0.005)).is_some());
         assert!(looked.seen_near(eye, turned(0.06)).is_none());
+        // A fifth of its half width shows other ground, however high a picture is.
+        let upright = [rays[0], 0.1 * Vec3::X, 0.9 * Vec3::Y];
+        let narrow = Looked {
+            rays: upright,
+            ..looked
+        };
+        let aside = |by: f32| [upright[0] + by * Vec3::X, upright[1], upright[2]];
+        assert!(narrow.seen_near(eye, aside(0.005)).is_some());
+        assert!(narrow.seen_near(eye, aside(0.02)).is_none());
         let farther = [rays[0], 0.5 * rays[1], 0.5 * rays[2]];
         assert!(looked.seen_near(eye, farther).is_none());
     }

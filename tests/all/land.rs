@@ -339,7 +339,7 @@ fn sky_is_not_drawn_and_no_ground_is_lost_with_it() {
             |(h, d): &(&veduta::terrain::TerrainHit, &f32)| h.distance.is_finite() != (**d > 0.0);
         let apart = found.iter().zip(&depths).filter(apart).count();
         println!("{height} m, {pitch} degrees: {hits} hits, {apart} apart");
-        // Its heights are baked half as finely as those for the rays; a tile has 12 pixels.
+        // Its heights are baked half as finely as those for the rays.
         assert!(
             draws == 1 && apart <= 6,
             "{height} m, {pitch} degrees: {apart}"
@@ -348,6 +348,77 @@ fn sky_is_not_drawn_and_no_ground_is_lost_with_it() {
     let above = WorldPos::from_metres([13_500.0, top + 10.0, -14_700.0].into());
     assert_eq!(draw(above, 40.0).1, 0, "nothing rises that high");
     assert_eq!(draw(above, 0.0).1, 1);
+}
+
+#[test]
+fn no_ground_is_lost_however_the_picture_is_turned() {
+    use veduta::glam::{Mat4, Vec3};
+    use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
+    use veduta::{Targets, View};
+    let gpu = gpu();
+    let (rows, columns) = (36, 64);
+    let targets = Targets {
+        color_format: wgpu::TextureFormat::Rgba32Float,
+        depth_format: Some(wgpu::TextureFormat::Depth32Float),
+        ..Default::default()
+    };
+    let options = TerrainOptions {
+        land: Land::named("thesis").unwrap(),
+        far: 50_000.0,
+        ..Default::default()
+    };
+    let mut terrain = Terrain::new(&gpu.device, veduta::programs(), &targets, &options).unwrap();
+    let (level, _) = rays(&options.land, rows, 300.0, 0.0, [13_500.0, -14_700.0]);
+    let mut part_of_the_sky = 0;
+    for (roll, pitch) in [
+        (0, -35),
+        (37, 10),
+        (90, 10),
+        (140, 20),
+        (180, 15),
+        (270, -5),
+        (215, -60),
+        (0, -85),
+        (45, 75),
+    ] {
+        let mut view = View {
+            eye: level[0].origin,
+            ..Default::default()
+        };
+        view.look(0.3, f64::to_radians(pitch.into()), 1.1, 16.0 / 9.0);
+        view.world_from_view *= Mat4::from_rotation_z((roll as f32).to_radians());
+        let lights = TerrainLights::clear(Vec3::ONE);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let _ = terrain
+            .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+            .unwrap();
+        gpu.queue.submit([encoder.finish()]);
+        let (_, depths, _) = drawn(&terrain, columns, rows, 0.0);
+        let [middle, right, up] = view.rays().unwrap().map(|v| v.as_dvec3());
+        let at = |i: usize, n: usize| 2.0 * (i as f64 + 0.5) / n as f64 - 1.0;
+        let seen: Vec<TerrainRay> = (0..rows * columns)
+            .map(|i| {
+                let (x, y) = (i % columns, i / columns);
+                let dir = middle + right * at(x, columns) - up * at(y, rows);
+                TerrainRay {
+                    dir: dir.normalize().to_array(),
+                    ..level[0]
+                }
+            })
+            .collect();
+        let angle = (2.0 * up.length() / rows as f64) as f32;
+        let path = RayPath::Fast;
+        let found = ray_hits(gpu, veduta::programs(), &options.land, &seen, angle, path).unwrap();
+        let hits = found.iter().filter(|h| h.distance.is_finite()).count();
+        let lost = found.iter().zip(&depths);
+        let lost = lost
+            .filter(|(h, d)| h.distance.is_finite() != (**d > 0.0))
+            .count();
+        println!("roll {roll}, pitch {pitch}: {hits} hits, {lost} apart");
+        assert!(lost <= 12, "roll {roll}, pitch {pitch}: {lost}");
+        part_of_the_sky += u32::from(hits > 100 && hits < rows * columns - 100);
+    }
+    assert!(part_of_the_sky >= 5, "{part_of_the_sky}");
 }
 
 /// Judges `sun_share`: from the side, and in front, where lines enter levels across their corners.

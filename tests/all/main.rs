@@ -24,6 +24,7 @@ mod ground_rows;
 mod ground_seams;
 mod hash;
 mod land;
+mod land_low;
 mod landscape;
 mod map;
 mod noise;

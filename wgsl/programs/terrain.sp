@@ -66,12 +66,8 @@ fn lowest(left: f32, right: f32, y: f32) -> f32 {
     return min(a.y / max(length(a.xz), 1e-6), b.y / max(length(b.xz), 1e-6));
 }
 
-// Columns of the picture, two triangles each, from the first to the last of their rows in which a ray comes down to the ground around it; those without any have no size.
-@vertex
-fn cover(@builtin(vertex_index) index: u32) -> Corner {
-    let column = index / 6u;
-    let corner = index % 6u;
-    let k = select(select(3u, corner % 3u, corner == 4u), select(corner, 2u, corner == 3u), corner < 4u);
+// Which rows of a column of the picture hold rays that come down to the ground around it: the highest and the lowest of them, above which and below which there is none.
+fn shown_rows(column: i32) -> vec2<f32> {
     let width = 2.0 / COLUMNS;
     let height = 2.0 / ROWS;
     let near_x = f32(column) * width - 1.0;
@@ -101,8 +97,7 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
         }
     }
     let bend = select(max(cos(right - left), 0.3), 1.0, wide);
-    var bottom = 2.0;
-    var top = -2.0;
+    var rows = vec2<f32>(2.0, -2.0);
     var below = lowest(near_x, far_x, -1.0);
     for (var j = 0; j < i32(ROWS); j++) {
         let low = f32(j) * height - 1.0;
@@ -110,13 +105,30 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
         let least = min(below, above);
         let bound = least / select(bend, 1.0, least > 0.0);
         if skyline >= bound - 1e-3 * (1.0 + abs(bound)) || (wide && least < 0.0) {
-            bottom = min(bottom, low);
-            top = low + height;
+            rows = vec2<f32>(min(rows.x, low), low + height);
         }
         below = above;
     }
-    let at = vec2<f32>(select(near_x, far_x, (k & 1u) == 1u), select(bottom, top, k > 1u));
-    return Corner(vec4<f32>(select(vec2<f32>(0.0), at, top > bottom), 0.5, 1.0), ray_through(at));
+    return rows;
+}
+
+// One triangle over the part of the picture that lies below a line, level in the world, which is as low as all columns' ground lets it be; without ground it has no size. Narrow columns of their own, or
+// two triangles, have longer borders: on devices that shade blocks of pixels those are shaded twice and more.
+@vertex
+fn cover(@builtin(vertex_index) index: u32) -> Corner {
+    let rise = vec2<f32>(draw_view.ray_right.y, draw_view.ray_up.y);
+    let steep = length(rise);
+    let up = select(vec2<f32>(0.0, 1.0), rise / max(steep, 1e-30), steep > 1e-9);
+    var line = -4.0;
+    for (var column = 0; column < i32(COLUMNS); column++) {
+        let rows = shown_rows(column);
+        let side = (f32(column) + select(0.0, 1.0, up.x > 0.0)) * 2.0 / COLUMNS - 1.0;
+        line = select(line, max(line, up.x * side + max(up.y * rows.x, up.y * rows.y)), rows.y > rows.x);
+    }
+    // From there on down it is wider than the picture, whichever way that is turned.
+    let across = vec2<f32>(up.y, -up.x);
+    let at = up * (line - select(0.0, 6.0, index == 2u)) + across * select(select(-3.0, 3.0, index == 1u), 0.0, index == 2u);
+    return Corner(vec4<f32>(select(vec2<f32>(0.0), at, line > -3.0), 0.5, 1.0), ray_through(at));
 }
     }#
 }#
