@@ -40,6 +40,7 @@ mod sweep;
 mod tables;
 mod temporal;
 mod terrain;
+mod terrain_faults;
 mod tone_map;
 mod validators;
 mod warp;
