@@ -177,23 +177,32 @@ fn strata(value: f64, period: f64, hardness: f64, variance: f64) -> [f64; 3] {
 fn mesa(field: &Field, cell: [i32; 2], frac: [f64; 2], footprint: f64) -> Ground {
     let hurst = -field.fall.log2();
     let mut value = [0.0; 3];
-    let (mut variance, mut lost) = (field.mean[0], field.lost[0]);
     for i in 0..field.octaves {
         let keep = kept(field.wavelength / octave_frequency(i), footprint);
         let n = octave_noise_2d(cell, frac, i, field.seed);
         for a in 0..3 {
             value[a] += keep * octave_amplitude(i, hurst) * n[a];
         }
-        variance -= keep * keep * field.mean[1] * field.mean[2].powi(i);
-        lost -= keep * keep * field.lost[1] * field.lost[2].powi(i);
     }
-    if kept(
-        field.wavelength / octave_frequency(field.octaves - 1),
-        footprint,
-    ) >= 1.0
-    {
-        (variance, lost) = (0.0, 0.0);
-    }
+    let share = |i: i32| kept(field.wavelength / octave_frequency(i), footprint);
+    let whole = (0..field.octaves).take_while(|i| share(*i) >= 1.0).count() as i32;
+    // What is left by the octaves that count, and of the one that fades by as much as its square.
+    let left = |series: [f64; 4]| {
+        let after = |k: i32| {
+            if k >= field.octaves {
+                0.0
+            } else {
+                remainder(6, series, k).max(0.0)
+            }
+        };
+        let keep = if whole < field.octaves {
+            share(whole)
+        } else {
+            0.0
+        };
+        after(whole) - keep * keep * (after(whole) - after(whole + 1))
+    };
+    let (variance, lost) = (left(field.mean), left(field.lost));
     let within = (footprint / field.wavelength).powi(2) / 12.0 * (field.lost[0] - lost).max(0.0);
     let [height, slope, spread] = strata(
         value[0],
@@ -210,6 +219,9 @@ fn mesa(field: &Field, cell: [i32; 2], frac: [f64; 2], footprint: f64) -> Ground
 pub fn ground(field: &Field, kind: i32, offset: [f64; 2], footprint: f64) -> Ground {
     let place: [f64; 2] = std::array::from_fn(|k| field.frac[k] + offset[k] / field.wavelength);
     let p = split_2d(field.cell, place);
+    if kind == 5 {
+        return own(field, offset, footprint);
+    }
     if kind == 4 {
         return mix(field, p.cell, p.frac, footprint);
     }
@@ -241,6 +253,46 @@ pub fn ground(field: &Field, kind: i32, offset: [f64; 2], footprint: f64) -> Gro
         }
     }
     scaled(field, value, lost.max(0.0))
+}
+
+/// The program's own function, which is `veduta::terrain::height` unless a program has another, with octaves that fade and slopes by differences over the footprint.
+fn own(field: &Field, offset: [f64; 2], footprint: f64) -> Ground {
+    let width = footprint.max(1e-3);
+    let reach = (field.wavelength / width).max(1.0);
+    let whole = reach.log2().floor() as i32;
+    let x = (reach / f64::from(whole).exp2() - 1.0).clamp(0.0, 1.0);
+    let share = if whole >= 1 && whole < field.octaves {
+        x * x * (3.0 - 2.0 * x)
+    } else {
+        0.0
+    };
+    let octaves = whole.clamp(1, field.octaves.max(1));
+    let land = super::terrain::Terrain {
+        cell: field.cell,
+        frac: field.frac,
+        wavelength: field.wavelength,
+        amplitude: field.amplitude,
+        hurst: -field.fall.log2(),
+        gain: field.shape,
+        smoothness: field.detail,
+        seed: field.seed,
+    };
+    let at = |x: f64, z: f64| {
+        let place = [offset[0] + x, offset[1] + z];
+        let coarse = super::terrain::height(&land, place, octaves);
+        if share <= 0.0 {
+            return coarse;
+        }
+        coarse + share * (super::terrain::height(&land, place, octaves + 1) - coarse)
+    };
+    Ground {
+        height: field.base + at(0.0, 0.0),
+        slope: [
+            (at(width, 0.0) - at(-width, 0.0)) / (2.0 * width),
+            (at(0.0, width) - at(0.0, -width)) / (2.0 * width),
+        ],
+        lost: 0.0,
+    }
 }
 
 fn scaled(field: &Field, value: [f64; 3], lost: f64) -> Ground {

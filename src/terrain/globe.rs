@@ -170,7 +170,7 @@ impl<T: Real> Globe<T> {
         }
     }
 
-    /// The field below or above a position, filtered by a footprint (m); 0 takes it as it is.
+    /// The field below or above a position, filtered by a footprint (m); 0 takes it as it is, and so do footprints below 0 and NaN.
     pub fn ground(&self, position: WorldPos, footprint: T) -> GlobeGround<T> {
         self.ground_at(self.place(position), footprint)
     }
@@ -184,7 +184,7 @@ impl<T: Real> Globe<T> {
         out.map(|c| c / length)
     }
 
-    /// The field at a place of the ball.
+    /// The field at a place of the ball, filtered by a footprint (m) as in [`Globe::ground`].
     pub fn ground_at(&self, place: GlobePlace<T>, footprint: T) -> GlobeGround<T> {
         let [zero, one, two] = [0.0, 1.0, 2.0].map(T::of);
         let field = &self.field;

@@ -1,9 +1,10 @@
 //! Heights of given places of a ball on the device, and where given rays meet it.
 
 use super::clipmap::group;
+use super::field::Domain;
 use super::globe::{Globe, GlobeGround};
 use super::land::Land;
-use super::query::{Program, check_places};
+use super::query::{Program, TerrainQuery};
 use super::rays::{RayPath, TerrainHit, TerrainRay};
 use crate::device::Gpu;
 use crate::error::Error;
@@ -63,11 +64,11 @@ fn number(row: &[u8], at: usize) -> f32 {
     f32::from_le_bytes([row[at], row[at + 1], row[at + 2], row[at + 3]])
 }
 
-/// The field of a land on a ball below or above positions, filtered by a footprint (m), as the device computes it. Submits and waits.
+/// [`TerrainQuery::globe_heights`] of a query that is made for the call, with the compilation of what it needs: the field of a land on a ball below or above positions, filtered by a footprint (m),
+/// as the device computes it. Submits and waits.
 ///
 /// # Errors
-/// As [`Land::globe`]; [`Error::OutOfDomain`] for a footprint that is not finite or below 0 and for positions that are not finite; the faults of [`ProgramSet::get`] and of making
-/// the pipeline; [`Error::Device`].
+/// As [`Land::globe`] and [`TerrainQuery::globe_heights`].
 pub fn globe_heights(
     gpu: &Gpu,
     programs: &ProgramSet,
@@ -75,13 +76,30 @@ pub fn globe_heights(
     positions: &[WorldPos],
     footprint: f32,
 ) -> Result<Vec<GlobeGround<f32>>, Error> {
-    let globe = land.globe::<f32>()?;
-    check_places(positions, footprint)?;
+    if land.field.domain != Domain::Sphere {
+        // It says which function takes a plane.
+        land.globe::<f32>()?;
+    }
+    TerrainQuery::new(gpu, programs, land)?.globe_heights(positions, footprint)
+}
+
+/// The program that finds heights of places on a ball.
+pub(super) fn places(gpu: &Gpu, programs: &ProgramSet, land: &Land) -> Result<Program, Error> {
+    let kind = [("FIELD_KIND", f64::from(land.field.kind.number()))];
+    compute(&gpu.device, programs, "terrain_globe_heights", &[], &kind)
+}
+
+/// [`TerrainQuery::globe_heights`]; the positions are checked.
+pub(super) fn grounds(
+    gpu: &Gpu,
+    program: &Program,
+    globe: &Globe<f32>,
+    positions: &[WorldPos],
+    footprint: f32,
+) -> Result<Vec<GlobeGround<f32>>, Error> {
     if positions.is_empty() {
         return Ok(Vec::new());
     }
-    let kind = [("FIELD_KIND", f64::from(land.field.kind.number()))];
-    let program = compute(&gpu.device, programs, "terrain_globe_heights", &[], &kind)?;
     let buffer = uniform(gpu, &globe.block(WorldPos::default(), 0.0));
     let mut rows = Vec::with_capacity(positions.len() * 48);
     for position in positions {
@@ -93,7 +111,7 @@ pub fn globe_heights(
         words(&mut rows, place.up);
         words(&mut rows, [0.0]);
     }
-    let data = run(gpu, &program, &buffer, &rows, [48, 32])?;
+    let data = run(gpu, program, &buffer, &rows, [48, 32])?;
     Ok(data
         .chunks_exact(32)
         .map(|row| GlobeGround {

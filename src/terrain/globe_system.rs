@@ -72,6 +72,10 @@ impl GlobeTerrain {
             return Err(fault("terrain.far", value, "in [100, 1e9] m over a ball"));
         }
         let globe = options.land.globe::<f32>()?;
+        if options.sky_sectors > 16 {
+            let value = options.sky_sectors.to_string();
+            return Err(fault("terrain.sky_sectors", value, "in [0, 16]"));
+        }
         let settings = Settings::resolve(programs, &options.preset, None, &[])?;
         let number = |key: &str, or: f64| settings.number(key).unwrap_or(or);
         let constants = [
@@ -79,6 +83,8 @@ impl GlobeTerrain {
             ("OUTPUT", output_of(targets.color_format)?),
             ("GLOBE_STEPS", number("GLOBE_STEPS", 600.0)),
             ("GLOBE_STEPS_SHADOW", number("GLOBE_STEPS_SHADOW", 40.0)),
+            ("ROCK_CHEAP", number("TEXTURE_LOW_QUALITY", 0.0)),
+            ("SKY_SECTORS", f64::from(options.sky_sectors)),
         ];
         let (pipeline, layouts) = surface_pipeline(
             device,

@@ -217,12 +217,12 @@ impl<T: Real> Prepared<T> {
         }
     }
 
-    /// The field at a position, filtered by a footprint (m); 0 takes it as it is. NaN for a program's own function, which only the device knows.
+    /// The field at a position, filtered by a footprint (m); 0 takes it as it is, and so do footprints below 0 and NaN. NaN for a program's own function, which only the device knows.
     pub fn ground(&self, position: WorldPos, footprint: T) -> Ground<T> {
         self.ground_at(self.place(position), footprint)
     }
 
-    /// The field at an offset (x, z) in metres from a place, as the device has it from the eye's.
+    /// The field at an offset (x, z) in metres from a place, as the device has it from the eye's, filtered by a footprint (m) as in [`Prepared::ground`].
     pub fn ground_from(&self, eye: Place<T>, offset: [T; 2], footprint: T) -> Ground<T> {
         self.ground_at(self.moved(eye, offset), footprint)
     }
@@ -247,7 +247,7 @@ impl<T: Real> Prepared<T> {
         self.map.clone()
     }
 
-    /// The field at a place on its lattice, or the level sea above it where there is one.
+    /// The field at a place on its lattice, filtered by a footprint (m) as in [`Prepared::ground`], or the level sea above it where there is one.
     pub fn ground_at(&self, place: Place<T>, footprint: T) -> Ground<T> {
         let bare = self.bare_at(place, footprint);
         if bare.height < self.sea {
@@ -263,6 +263,8 @@ impl<T: Real> Prepared<T> {
 
     /// The field at a place on its lattice, below the sea too.
     pub(super) fn bare_at(&self, place: Place<T>, footprint: T) -> Ground<T> {
+        // NaN too.
+        let footprint = footprint.most(T::of(0.0));
         if let Some(map) = &self.map {
             let detail = self.octave_sum(place, footprint);
             let map = map.ground(place, self.wavelength, footprint);

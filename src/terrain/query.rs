@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::clipmap::{Clipmap, ClipmapOptions, Gaze, Searched, group, nearest_ground};
 use super::field::field_kind;
-use super::globe::Globe;
+use super::globe::{Globe, GlobeGround};
 use super::globe_rays;
 use super::ground::{Ground, Prepared};
 use super::land::Land;
@@ -167,7 +167,7 @@ impl TerrainQuery {
     /// The field at positions, filtered by a footprint (m). Submits and waits.
     ///
     /// # Errors
-    /// [`Error::OutOfDomain`] for a footprint that is not finite or below 0, for positions that are not finite, and over a ball, where [`super::globe_heights`] answers; the faults of
+    /// [`Error::OutOfDomain`] for a footprint that is not finite or below 0, for positions that are not finite, and over a ball, where [`TerrainQuery::globe_heights`] answers; the faults of
     /// [`ProgramSet::get`] and of making the pipeline; [`Error::Device`].
     pub fn heights(
         &mut self,
@@ -179,7 +179,7 @@ impl TerrainQuery {
             return Err(Error::OutOfDomain {
                 name: "field.domain".to_owned(),
                 value: "Sphere".to_owned(),
-                domain: "Plane; globe_heights takes a Sphere".to_owned(),
+                domain: "Plane; TerrainQuery::globe_heights takes a Sphere".to_owned(),
             });
         };
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
@@ -219,6 +219,32 @@ impl TerrainQuery {
             }));
         }
         Ok(results)
+    }
+
+    /// The field of a land on a ball below or above positions, filtered by a footprint (m), as the device computes it. Submits and waits. It keeps its pipeline.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`] for a footprint that is not finite or below 0, for positions that are not finite, and over a plane, where [`TerrainQuery::heights`] answers; the faults of
+    /// [`ProgramSet::get`] and of making the pipeline; [`Error::Device`].
+    pub fn globe_heights(
+        &mut self,
+        positions: &[WorldPos],
+        footprint: f32,
+    ) -> Result<Vec<GlobeGround<f32>>, Error> {
+        check_places(positions, footprint)?;
+        let Shape::Ball(globe) = &self.shape else {
+            return Err(Error::OutOfDomain {
+                name: "field.domain".to_owned(),
+                value: "Plane".to_owned(),
+                domain: "Sphere; TerrainQuery::heights takes a Plane".to_owned(),
+            });
+        };
+        let program = match self.places.take() {
+            Some(made) => made,
+            None => globe_rays::places(&self.gpu, &self.programs, &self.land)?,
+        };
+        let program = self.places.insert(program);
+        globe_rays::grounds(&self.gpu, program, globe, positions, footprint)
     }
 
     /// Follows rays. The footprint grows with the distance by `pixel_angle` (rad). Submits and waits. On the path `Fast` over a plane heights are baked around each origin of 16,384 rays or more ([`TerrainQuery::set_baked_from`]),

@@ -134,6 +134,21 @@ impl Found {
     }
 }
 
+/// Checks the radius of a planet (m).
+///
+/// # Errors
+/// [`Error::OutOfDomain`].
+pub(super) fn check_radius(planet_radius: f64) -> Result<(), Error> {
+    if (1e5..=1e9).contains(&planet_radius) {
+        return Ok(());
+    }
+    Err(Error::OutOfDomain {
+        name: "planet_radius".to_owned(),
+        value: planet_radius.to_string(),
+        domain: "in [1e5, 1e9] m".to_owned(),
+    })
+}
+
 /// Where a ray that ran out of steps most likely meets the ground, as `veduta::terrain::clipmap::likely_end` says.
 fn likely_end(start: f64, radius: f64, mu: f64, t: f64, clearance: f64, far: f64) -> Option<f64> {
     let below = altitude_along(start, radius, mu, t) - clearance;
@@ -288,10 +303,12 @@ impl<T: Real> Prepared<T> {
 
     /// The first place where a ray meets the field as its footprint filters it, by bracketing: steps of half a footprint, at least `least` metres, longer where bounds show the ray clear, and
     /// bisection. A stretch below the ground that is shorter than half a footprint may be missed; nothing else can be. A ray that has taken 2^18 steps (about half a second) ends as
-    /// [`TerrainHit::capped`]. [`Land::ray_hits`] is the same for a whole land.
+    /// [`TerrainHit::capped`]. The plane is bent below the ray's origin to a ball of the radius `planet_radius` (m), in [1e5, 1e9]; the footprint grows by `pixel_angle` (rad) with the distance.
+    /// [`Land::ray_hits`] is the same for a whole land.
     ///
     /// # Errors
-    /// As [`TerrainRay::check`]; [`Error::OutOfDomain`] for an angle that is below 0, a least step that is not above it, and a program's own function, which the processor does not know.
+    /// As [`TerrainRay::check`]; [`Error::OutOfDomain`] for a radius outside of its domain, an angle that is below 0, a least step that is not above it, and a program's own function, which the
+    /// processor does not know.
     pub fn ray_hit(
         &self,
         planet_radius: f64,
@@ -312,6 +329,7 @@ impl<T: Real> Prepared<T> {
         share: f64,
     ) -> Result<TerrainHit, Error> {
         ray.check(0)?;
+        check_radius(planet_radius)?;
         if let Kind::Own { .. } = self.kind() {
             return Err(Error::OutOfDomain {
                 name: "field.kind".to_owned(),

@@ -69,7 +69,8 @@ pub struct TerrainOptions {
     pub land: Land,
     /// Distance at which rays end (m), in [100, 4e6]; to 1e9 where the domain is `Sphere`.
     pub far: f64,
-    /// Sectors in which the horizons around a place take light off the sky (ambient occlusion), in [0, 16]; 0 leaves all of it. Nothing comes of it over a ball.
+    /// Sectors in which the horizons around a place take light off the sky (ambient occlusion), in [0, 16]; 0 leaves all of it. Over a ball
+    /// they are looked for in the field itself, which costs six heights a sector and pixel.
     pub sky_sectors: u32,
     /// Texels of a side of each level of baked heights: 128, 256, 512 or 1024. A texel is about as wide as a pixel where it is used when this is 3.5 over the angle of a pixel. 0 leaves it to the
     /// preset's CLIP_TEXELS, 512. Where they are finer than these, rays take as many more steps. Nothing comes of it over a ball, where nothing is baked.

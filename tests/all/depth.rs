@@ -108,6 +108,6 @@ fn every_depth_leads_back_to_the_ground() {
             "{depth:?}: {seen} pixels, {high:.3} footprints off the field at 98 %, the format's grain is at most {worst:.3} footprints"
         );
         assert!(seen > 1000, "{depth:?}");
-        assert!(high <= 0.5, "{depth:?}: {high}");
+        assert!(high <= 0.04, "{depth:?}: {high}");
     }
 }

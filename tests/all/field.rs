@@ -157,6 +157,7 @@ fn the_device_is_the_processor_to_its_last_places_and_truth_to_thirty_millimetre
         let double = field.prepare::<f64>().unwrap();
         let mut same = 0;
         let (mut worst, mut off, mut total) = (0_f64, 0_f64, 0);
+        let (mut alone, mut far_apart) = (0_f64, 0);
         for reach in [1e4, 1e8, 1e14] {
             for width in [0.0, footprint(&mut random), footprint(&mut random)] {
                 let places: Vec<WorldPos> =
@@ -168,19 +169,35 @@ fn the_device_is_the_processor_to_its_last_places_and_truth_to_thirty_millimetre
                     total += 1;
                     same += i32::from(twin == g);
                     let apart = f64::from((g.height - twin.height).abs());
+                    let unit = 0.5 * f64::from(f32::EPSILON);
                     // Where a sum passes 0 its own last place says nothing: the amplitude is the least size.
                     let size = f64::from(g.height).abs().max(field.amplitude);
-                    worst = worst.max(apart / (0.5 * f64::from(f32::EPSILON) * size));
+                    worst = worst.max(apart / (unit * size));
+                    let own = f64::from(g.height).abs();
+                    if own > 1.0 {
+                        alone = alone.max(apart / (unit * own));
+                    }
+                    far_apart += i32::from(apart > 4.0 * unit * own.max(1.0));
                     off = off.max((f64::from(g.height) - truth.height).abs());
                     assert!(g.lost >= 0.0 && g.lost.is_finite());
                 }
             }
         }
         println!(
-            "{name}: {same} of {total} bit by bit, {worst:.1} places, {:.1} mm",
+            "{name}: {same} of {total} bit by bit, {worst:.1} places, {alone:.1} of the height itself above 1 m ({far_apart} beyond 4), {:.1} mm",
             1e3 * off
         );
-        assert!(worst <= 4.0, "{name}: {worst} places");
+        if let Kind::Mix { .. } = field.kind {
+            assert!(worst <= 4.0, "{name}: {worst} places");
+            // Measured: 1.2 % of all heights beyond 4 of their own last places, where the three noises nearly cancel, up to 317 of a height above 1 m.
+            assert!(
+                far_apart * 50 < total && alone < 1000.0,
+                "{name}: {far_apart}, {alone}"
+            );
+        } else {
+            // The same operations in the same order.
+            assert_eq!(same, total, "{name}: {worst} places");
+        }
         assert!(off <= 0.030, "{name}: {off} m");
     }
 }
@@ -532,7 +549,12 @@ fn heights_a_hundred_kilometres_from_the_eye_are_true_to_thirty_millimetres() {
             apart
         );
         assert!(off <= 0.030, "{name}: {off} m");
-        assert!(apart <= 4.0, "{name}: {apart} places");
+        match field.kind {
+            Kind::Mix { .. } | Kind::Mesa { .. } => {
+                assert!(apart <= 4.0, "{name}: {apart} places");
+            }
+            _ => assert_eq!(same as usize, rows.len(), "{name}: {apart} places"),
+        }
     }
 }
 

@@ -338,10 +338,31 @@ fn sky_is_not_drawn_and_no_ground_is_lost_with_it() {
         let apart =
             |(h, d): &(&veduta::terrain::TerrainHit, &f32)| h.distance.is_finite() != (**d > 0.0);
         let apart = found.iter().zip(&depths).filter(apart).count();
-        println!("{height} m, {pitch} degrees: {hits} hits, {apart} apart");
-        // Its heights are baked half as finely as those for the rays.
+        // What can be seen is looked for in 16 columns of 24 rows: one that is lost takes a row of 4 pixels with it at the least.
+        let lost = |x: usize, y: usize| {
+            let i = y * columns + x;
+            found[i].distance.is_finite() && depths[i] <= 0.0
+        };
+        let rows_lost = (0..rows * columns / 4)
+            .map(|k| (k % (columns / 4) * 4, k / (columns / 4)))
+            .filter(|(x, y)| (0..4).all(|k| lost(x + k, *y)))
+            .count();
+        // Next to a border of the ground a pixel may see either side of it: heights are baked half as finely as those for the rays.
+        let inside = (0..rows * columns)
+            .filter(|i| {
+                let (x, y) = (i % columns, i / columns);
+                let around = (y.saturating_sub(1)..(y + 2).min(rows)).all(|v| {
+                    (x.saturating_sub(1)..(x + 2).min(columns))
+                        .all(|u| found[v * columns + u].distance.is_finite())
+                });
+                around && lost(x, y)
+            })
+            .count();
+        println!(
+            "{height} m, {pitch} degrees: {hits} hits, {apart} apart, {inside} of them within ground, {rows_lost} rows of a part"
+        );
         assert!(
-            draws == 1 && apart <= 6,
+            draws == 1 && apart <= 6 && inside == 0 && rows_lost == 0,
             "{height} m, {pitch} degrees: {apart}"
         );
     }
@@ -678,7 +699,117 @@ fn penumbra_is_the_share_of_the_disc_that_is_seen() {
     assert!(mean < 0.2 && most < 0.5);
 }
 
-/// Judges `sky_share`, and with it `baked_height`.
+/// Judges `baked_height`: what a program reads where rays meet the ground, by the same patch between four heights of the field in double precision.
+#[test]
+fn baked_heights_are_patches_between_heights_of_the_field() {
+    use veduta::compose::Source;
+    use veduta::glam::Vec3;
+    use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
+    // The program with what it reads for a colour: the height, the place, and the width of a texel.
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = std::env::temp_dir().join(format!("veduta-baked-{}", std::process::id()));
+    copy(&root.join("wgsl"), &folder);
+    let file = folder.join("programs/terrain.sp");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let changed = text
+        .replace(
+            "clipmap::{Clip, Sweep, sun_share}",
+            "clipmap::{Clip, Sweep, sun_share, baked_height, level_of}",
+        )
+        .replace(
+            "return Shown(displayed(OUTPUT, radiance, draw_view.exposure, vec2<u32>(in.position.xy)),",
+            "let least = select(0, 5, (u32(in.position.x) & 1u) == 1u);
+    let served = min(max(level_of(clip, point.xz), least), clip.levels - 1);
+    let read = baked_height(heights, wrapping, places, clip, point.xz, least);
+    return Shown(vec4<f32>(read, point.x, point.z, clip.spacing * exp2(f32(served))) + 0.0 * displayed(OUTPUT, radiance, draw_view.exposure, vec2<u32>(in.position.xy)),",
+        );
+    assert!(changed.contains("level_of}") && changed.contains("let read ="));
+    std::fs::write(&file, changed).unwrap();
+    let source = Source::read(&[&folder, &root.join("presets")]).unwrap();
+    let mut set = veduta::programs().clone();
+    set.programs.to_mut().retain(|p| p.program != "terrain");
+    set.programs
+        .to_mut()
+        .push(source.compose("terrain", &[]).unwrap());
+    std::fs::remove_dir_all(&folder).unwrap();
+    let targets = veduta::Targets {
+        color_format: wgpu::TextureFormat::Rgba32Float,
+        depth_format: Some(wgpu::TextureFormat::Depth32Float),
+        ..Default::default()
+    };
+    let gpu = gpu();
+    let (rows, columns) = (36, 64);
+    for (name, height, at) in [
+        ("thesis", 300.0, [13_500.0, -14_700.0]),
+        ("hills", 2.0, [-3e7, 4e7]),
+    ] {
+        let land = Land::named(name).unwrap();
+        let (rays, _) = rays(&land, rows, height, -10.0, at);
+        let options = TerrainOptions {
+            land: land.clone(),
+            far: 50_000.0,
+            ..Default::default()
+        };
+        let mut terrain = Terrain::new(&gpu.device, &set, &targets, &options).unwrap();
+        let mut view = veduta::View {
+            eye: rays[0].origin,
+            ..Default::default()
+        };
+        view.look(0.3, f64::to_radians(-10.0), 60_f32.to_radians(), 16.0 / 9.0);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let lights = TerrainLights::clear(Vec3::ONE);
+        let _ = terrain
+            .prepare(&gpu.queue, &mut encoder, &view, &lights, rows as u32)
+            .unwrap();
+        gpu.queue.submit([encoder.finish()]);
+        let (read, depths, _) = drawn(&terrain, columns, rows, 0.0);
+        let field = land.prepare::<f64>().unwrap();
+        let eye = view.eye.to_metres();
+        let (mut worst, mut judged, mut widths) = (0_f64, 0, std::collections::BTreeSet::new());
+        for (found, depth) in read.chunks_exact(4).zip(&depths) {
+            if *depth <= 0.0 {
+                continue;
+            }
+            let [baked, x, z, texel] = [0, 1, 2, 3].map(|k| f64::from(found[k]));
+            let [x, z] = [eye.x + x, eye.z + z].map(|c| c / texel);
+            let at = |i: f64, k: f64| {
+                let corner = [(x.floor() + i) * texel, 0.0, (z.floor() + k) * texel];
+                field
+                    .ground(WorldPos::from_metres(corner.into()), texel)
+                    .height
+            };
+            let (u, v) = (x - x.floor(), z - z.floor());
+            let near = at(0.0, 0.0) * (1.0 - u) + at(1.0, 0.0) * u;
+            let far = at(0.0, 1.0) * (1.0 - u) + at(1.0, 1.0) * u;
+            worst = worst.max((baked - near * (1.0 - v) - far * v).abs());
+            widths.insert(texel as i64);
+            judged += 1;
+        }
+        println!(
+            "{name}: {:.1} mm off at {judged} places, {} widths of texels",
+            1e3 * worst,
+            widths.len()
+        );
+        assert!(judged > 1000 && widths.len() > 1);
+        assert!(worst < 0.05, "{name}: {worst} m");
+    }
+}
+
+/// Copies a folder.
+fn copy(from: &std::path::Path, to: &std::path::Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let there = to.join(path.file_name().unwrap());
+        if path.is_dir() {
+            copy(&path, &there);
+        } else {
+            std::fs::copy(&path, there).unwrap();
+        }
+    }
+}
+
+/// Judges `sky_share`.
 #[test]
 fn valleys_see_less_of_the_sky() {
     use veduta::glam::Vec3;
@@ -775,6 +906,38 @@ fn valleys_see_less_of_the_sky() {
         "{judged} places: mean share {mean:.3}, mean error {off:.3}, without horizons {flat:.3}"
     );
     assert!(judged > 150.0 && off < 0.08 && off < 0.6 * flat);
+}
+
+/// A radius that no planet has is refused, and a footprint that is none counts as 0.
+#[test]
+fn searches_have_a_planet_and_samples_a_width() {
+    for name in ["thesis", "mesa", "lowlands", "moon"] {
+        let land = Land::named(name).unwrap();
+        let field = land.prepare::<f64>().unwrap();
+        let ray = TerrainRay {
+            origin: WorldPos::from_metres([0.0, 9e3, 0.0].into()),
+            dir: [0.0, -1.0, 0.0],
+            far: 1e4,
+        };
+        for radius in [f64::NAN, f64::INFINITY, -6e6, 0.0, 9e4, 2e9] {
+            let text = field
+                .ray_hit(radius, &ray, 0.01, 0.1)
+                .unwrap_err()
+                .to_string();
+            assert!(
+                text.contains("planet_radius") && text.contains("[1e5, 1e9] m"),
+                "{text}"
+            );
+        }
+        let at = WorldPos::from_metres([812.0, 0.0, -3333.0].into());
+        for none in [f64::NAN, -1.0, -1e6, f64::NEG_INFINITY] {
+            assert_eq!(field.ground(at, none), field.ground(at, 0.0), "{name}");
+        }
+    }
+    let globe = Land::named("luna").unwrap().globe::<f64>().unwrap();
+    let at = globe.above([0.3, 0.4], 0.0);
+    assert_eq!(globe.ground(at, f64::NAN), globe.ground(at, 0.0));
+    assert_eq!(globe.ground(at, -5.0), globe.ground(at, 0.0));
 }
 
 #[test]

@@ -42,6 +42,7 @@ mod tables;
 mod targets;
 mod temporal;
 mod terrain;
+mod terrain_faults;
 mod tone_map;
 mod validators;
 mod warp;

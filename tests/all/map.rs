@@ -75,7 +75,7 @@ fn the_device_and_the_processor_read_maps_alike() {
                         total += 1;
                         same += i32::from(twin == g);
                         let apart = f64::from((g.height - twin.height).abs());
-                        places = places.max(apart / f64::from(g.height.abs().max(1000.0)));
+                        places = places.max(apart / f64::from(g.height.abs()).max(1e-9));
                         off = off.max((f64::from(g.height) - truth.height).abs());
                     }
                 }
@@ -85,7 +85,9 @@ fn the_device_and_the_processor_read_maps_alike() {
                 "{edge:?} {size:?}: {same} of {total} bit by bit, {places:.1} places, {:.2} mm",
                 1e3 * off
             );
-            assert!(places <= 4.0, "{edge:?} {size:?}: {places}");
+            // Heights are the same to the last bit; slopes and what is lost of them in nearly all places.
+            assert_eq!(places, 0.0, "{edge:?} {size:?}");
+            assert!(same * 10 > total * 8, "{edge:?} {size:?}: {same}");
             assert!(off <= 0.030, "{edge:?} {size:?}: {off} m");
         }
     }
@@ -245,7 +247,9 @@ fn rays_over_a_map_meet_it() {
                 );
                 assert!(errors.across.len() > 2800);
                 if path == RayPath::Fast {
-                    assert!(errors.wrong == 0 && errors.centile(0.99) < 0.5);
+                    // 100,000 km away with detail: 0.24.
+                    let bar = if place[0] < 1e6 { 0.005 } else { 0.5 };
+                    assert!(errors.wrong == 0 && errors.centile(0.99) < bar);
                 } else {
                     // Half the clearance is no safe step on slopes as steep as these: the march ends inside of cliffs, at 99 % up to 6.7 footprints deep.
                     assert!(errors.wrong as f64 <= 0.002 * rays.len() as f64);

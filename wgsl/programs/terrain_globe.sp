@@ -85,8 +85,9 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
 
 #FRAGMENT{
     #CODE{
+#import veduta::terrain::field::{height_spread}
 #import veduta::terrain::globe::{Globe, globe_up, globe_at}
-#import veduta::terrain::orbit::{globe_hit, globe_border, globe_shadow}
+#import veduta::terrain::orbit::{globe_hit, globe_border, globe_shadow, globe_sky_share}
 #import veduta::terrain::material::{Rock, faded_noise, snow_blend}
 #import veduta::terrain::shading::{ThreeLights, shade_rough}
 #import veduta::post::display::{displayed}
@@ -100,6 +101,8 @@ override FIELD_KIND: i32 = 2;
 override OUTPUT: i32 = 0;
 override GLOBE_STEPS: i32 = 600;
 override GLOBE_STEPS_SHADOW: i32 = 40;
+override ROCK_CHEAP: i32 = 0;
+override SKY_SECTORS: i32 = 0;
 
 const INVERSE_PI: f32 = 0.31830988618;
 
@@ -120,6 +123,20 @@ fn lights_at(mu: f32) -> ThreeLights {
     );
 }
 
+// Rock on a ball, in two qualities as on the plane: one fractal sum, or four. Veins stand where the plane has strata, since no way is up all around a ball. Places go by the lattice of the eye's foot point.
+fn ball_rock(place: vec3<f32>, up: vec3<f32>, footprint: f32) -> vec3<f32> {
+    let bulk = faded_noise(rock, place, vec3<i32>(1, 1, 1), 0u, footprint);
+    if ROCK_CHEAP != 0 {
+        return mix(rock.dark, rock.light, clamp(0.5 + 0.9 * bulk, 0.0, 1.0));
+    }
+    let bent = place + (0.5 * bulk * rock.wavelength) * up;
+    let veins = faded_noise(rock, bent, vec3<i32>(3, 3, 3), 1u, footprint);
+    let grain = faded_noise(rock, place, vec3<i32>(8, 8, 8), 2u, footprint);
+    let stains = faded_noise(rock, place, vec3<i32>(2, 2, 2), 3u, footprint);
+    let tone = clamp(0.5 + 0.75 * bulk + 0.3 * veins + 0.2 * grain, 0.0, 1.0);
+    return mix(mix(rock.dark, rock.light, tone), rock.stain, 0.6 * smoothstep(0.05, 0.6, stains));
+}
+
 @fragment
 fn draw(in: Corner) -> Shown {
     let dir = normalize(in.ray);
@@ -131,33 +148,34 @@ fn draw(in: Corner) -> Shown {
     let footprint = select(1e30, angle * hit.distance, is_met);
     let up = globe_up(globe, point);
     let mu = dot(up, draw_view.to_sun);
+    // The frame of the place: east, up, and across both.
+    let aside = select(vec3<f32>(0.0, 1.0, 0.0), vec3<f32>(1.0, 0.0, 0.0), abs(up.y) > 0.9);
+    let east = normalize(cross(aside, up));
+    let south = cross(east, up);
     // The ground without the sea, to blend their border over the heights that a footprint holds.
     var bare = globe;
     bare.sea = -1e30;
     let ground = globe_at(bare, FIELD_KIND, point, footprint);
-    let left_out = globe.amplitude * pow(min(footprint / globe.wavelength, 1.0), -log2(globe.fall));
-    let relief = max(0.5 * min(footprint, globe.wavelength) * length(ground.slope) + 0.35 * left_out, 0.01);
-    let land = smoothstep(-relief, relief, ground.height - globe.sea);
-    let slopes = land * ground.slope;
+    // As on the plane. Wider than the lattice nothing differs more.
+    let bare_slope = vec2<f32>(dot(ground.slope, east), dot(ground.slope, south));
+    let within = min(footprint, globe.wavelength);
+    let left = clamp(f32(globe.octaves) - log2(globe.wavelength / within), 0.0, f32(globe.octaves));
+    let tidal = max(2.24 * height_spread(bare_slope, ground.lost, within, left, globe.fall), 0.01);
+    let land = smoothstep(-tidal, tidal, ground.height - globe.sea);
     let lost = land * ground.lost;
     // The ball falls away behind the terminator: farther than what its highest ground sees over it there is no sun.
     let facing = dot(hit.normal, draw_view.to_sun) + sqrt(lost);
     let dusk = -sqrt(2.0 * max(globe.high - globe.low, 0.0) / globe.ground_radius) - draw_view.sun_width;
     let rounds = select(0, GLOBE_STEPS_SHADOW, is_met && facing > 0.0 && mu > dusk);
-    let blurred = globe_border(up, slopes, draw_view.to_sun, dir, footprint);
+    let blurred = globe_border(up, land * ground.slope, draw_view.to_sun, dir, footprint);
     let light = globe_shadow(globe, FIELD_KIND, point, draw_view.to_sun, draw_view.sun_width, footprint, blurred, rounds);
     let lit = select(0.0, light, mu > dusk);
-    // The frame of the place: east, up, and across both.
-    let aside = select(vec3<f32>(0.0, 1.0, 0.0), vec3<f32>(1.0, 0.0, 0.0), abs(up.y) > 0.9);
-    let east = normalize(cross(aside, up));
-    let south = cross(east, up);
-    let slope = vec2<f32>(dot(slopes, east), dot(slopes, south));
+    let slope = land * bare_slope;
     let to_sun = vec3<f32>(dot(draw_view.to_sun, east), mu, dot(draw_view.to_sun, south));
     // From the eye's foot point.
     let place = point + globe.up * globe.eye_altitude;
-    let tone = faded_noise(rock, place, vec3<i32>(1, 1, 1), 0u, footprint);
     let border = faded_noise(rock, place, vec3<i32>(4, 4, 4), 7u, footprint);
-    var albedo = mix(rock.dark, rock.light, clamp(0.5 + 0.9 * tone, 0.0, 1.0));
+    var albedo = ball_rock(place, up, footprint);
     let level = inverseSqrt(1.0 + dot(slope, slope) + lost);
     let blur = 0.5 * level * level * sqrt(lost * (1.0 - level * level));
     // Degrees of latitude, times 80 m.
@@ -168,7 +186,11 @@ fn draw(in: Corner) -> Shown {
     // Without a line there is no ice.
     let ice = select(0.0, smoothstep(line - 300.0, line + 300.0, globe.sea - 200.0), draw_view.snow_line > -9e4);
     albedo = mix(mix(draw_view.sea_albedo, draw_view.snow_albedo, ice), albedo, land);
-    let radiance = INVERSE_PI * albedo * shade_rough(lights_at(mu), slope, lost, to_sun, lit);
+    var lights = lights_at(mu);
+    if SKY_SECTORS > 0 {
+        lights.sky_color *= globe_sky_share(globe, FIELD_KIND, point, east, south, slope, footprint, select(0, SKY_SECTORS, is_met));
+    }
+    let radiance = INVERSE_PI * albedo * shade_rough(lights, slope, lost, to_sun, lit);
     if !is_met {
         discard;
     }

@@ -278,7 +278,8 @@ fn shadow_heights(shades: texture_2d_array<f32>, wrapping: sampler, sweep: Sweep
 }
 
 /// Share of the sun's disc that is seen past the baked ground from a place on it, given relative to the eye. `shades` holds the heights to which the shadows of
-/// the sun's upper and lower limb reach.
+/// the sun's upper and lower limb reach. At a shadow's border a texel decides, so that no bound of the error says anything there: 1.2 % of places with the sun from the side and 3.8 % with the sun in
+/// front are on the other side of it.
 ///
 /// domain  at in [-1e6, 1e6] m lin
 /// range   [0, 1] 1

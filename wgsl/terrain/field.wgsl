@@ -329,7 +329,7 @@ fn field_place(field: Field, offset: vec2<f32>) -> Lattice2d {
 
 /// The field at a place, filtered by the footprint. `kind` is one of the constants `FIELD_..`; given as an override it costs nothing. Of `FIELD_MAP` this is the detail.
 ///
-/// domain  kind in [0, 4] 1 lin
+/// domain  kind in [0, 7] 1 lin
 /// domain  offset in [-1e5, 1e5] m lin
 /// domain  footprint in [1e-3, 1e5] m log
 /// range   [-1e5, 1e5] 1

@@ -256,7 +256,7 @@ fn globe_octaves(globe: Globe, kind: i32, cell: vec3<i32>, frac: vec3<f32>, up: 
 
 /// The field at a place of the ball's lattice, where `up` is the way from the centre.
 ///
-/// domain  kind in [0, 2] 1 lin
+/// domain  kind in [0, 3] 1 lin
 /// domain  cell in [-2147483648, 2147483647] cell lin
 /// domain  frac in [0, 1] cell lin
 /// domain  up in [-1, 1] 1 lin
@@ -279,7 +279,7 @@ fn globe_frac(globe: Globe, at: vec3<f32>, altitude: f32) -> vec3<f32> {
 
 /// The field below or above a place.
 ///
-/// domain  kind in [0, 2] 1 lin
+/// domain  kind in [0, 3] 1 lin
 /// domain  at in [-2e5, 2e5] m lin
 /// domain  footprint in [1e-3, 1e5] m log
 /// range   [-1e5, 1e5] 1

@@ -3,12 +3,13 @@
 //! A ray starts where it comes below the highest ground. From a place where it is clear by c it is clear for c / (L s - r) more, where r is how much of it points up, s
 //! how much level, and L the steepest slope: altitude over a ball is convex. That holds of the field, and of the sum of its first octaves, when all that the others can add is taken
 //! off c, with the slope of these alone; octaves are added only until the step is long enough. A ray goes half a footprint at the least, as the reference does, and farther when it
-//! has used half of its steps. Between the last clear place and the first that is not, the crossing is bracketed by regula falsi that keeps to the inner four fifths.
+//! has used half of its steps: then it counts as one that ran out of them, and does not pass the place where it comes lowest. Between the last clear place and the first that is not, the crossing is bracketed by regula falsi that keeps to the inner four fifths.
 //!
 //! source   Galin2020 (local Lipschitz bounds); the tangent and the bracket: ours
 //! symbols  dir unit direction along the world's axes [1] · pixel_angle angle of a pixel [rad], so that the footprint is pixel_angle t · before what the ray has come already [m]
 #define_import_path veduta::terrain::orbit
 
+#import veduta::terrain::clipmap::{likely_end}
 #import veduta::terrain::globe::{Globe, GlobeGround, globe_altitude, globe_up, globe_at, globe_frac, globe_octaves}
 
 /// What a ray from the eye found.
@@ -19,7 +20,7 @@ struct GlobeHit {
     normal: vec3<f32>,
     /// The field there.
     ground: GlobeGround,
-    /// Steps taken; all of them when the ray ran out of them.
+    /// Steps taken; all of them when the ray ran out of them, or went on by longer steps than are sure.
     steps: i32,
 }
 
@@ -36,7 +37,17 @@ fn globe_span(globe: Globe, dir: vec3<f32>, altitude: f32) -> vec3<f32> {
     return vec3<f32>(min(large, small), max(large, small), select(0.0, 1.0, discriminant >= 0.0));
 }
 
-/// First place where a ray from the eye meets the ground before `far`, for a ray that has come `before` metres already, which count for its footprint. A ray that uses up `max_steps` has met it if it leads below all ground.
+/// Unit vector away from the ground at a place of the altitude.
+///
+/// internal
+fn globe_normal(globe: Globe, at: vec3<f32>, altitude: f32, slope: vec3<f32>) -> vec3<f32> {
+    let shrink = globe.ground_radius / (globe.ground_radius + altitude);
+    let gradient = globe_up(globe, at) - shrink * slope;
+    return gradient * inverseSqrt(max(dot(gradient, gradient), 1e-12));
+}
+
+/// First place where a ray from the eye meets the ground before `far`, for a ray that has come `before` metres already, which count for its footprint. A ray that uses up `max_steps`
+/// before it comes lowest is taken for what `likely_end` says of it.
 ///
 /// internal
 fn globe_hit(globe: Globe, kind: i32, dir: vec3<f32>, before: f32, far: f32, pixel_angle: f32, max_steps: i32) -> GlobeHit {
@@ -48,12 +59,15 @@ fn globe_hit(globe: Globe, kind: i32, dir: vec3<f32>, before: f32, far: f32, pix
     let inside = inner.z > 0.0 && inner.y > 0.0;
     let near = max(outer.x, 0.0);
     let end = min(select(outer.y, max(inner.x, 0.0) + margin, inside), far);
+    // Here it is nearest to the planet's centre.
+    let lowest = -(globe.ground_radius + globe.eye_altitude) * dot(dir, globe.up);
     var count = select(0, max_steps, outer.z > 0.0 && outer.y > 0.0 && near < end);
     var t = near;
     var clear = near;
     var clear_by = 0.0;
     var below = -1.0;
     var below_by = 0.0;
+    var hurried = false;
     var done = count == 0;
     while hit.steps < count && !done {
         hit.steps += 1;
@@ -63,7 +77,8 @@ fn globe_hit(globe: Globe, kind: i32, dir: vec3<f32>, before: f32, far: f32, pix
         let up = globe_up(globe, at);
         let rise = dot(up, dir);
         let level = sqrt(max(1.0 - rise * rise, 0.0));
-        let least = max(0.5 * footprint, 0.05) * exp2(16.0 * max(f32(hit.steps) / f32(max_steps) - 0.5, 0.0));
+        let own = max(0.5 * footprint, 0.05);
+        let least = own * exp2(16.0 * max(f32(hit.steps) / f32(max_steps) - 0.5, 0.0));
         let enough = select(4.0 * least, 1e30, below >= 0.0);
         let probe = globe_octaves(globe, kind, globe.cell, globe_frac(globe, at, altitude), up, footprint, altitude, rise, level, enough);
         let early = probe.step >= enough;
@@ -80,27 +95,60 @@ fn globe_hit(globe: Globe, kind: i32, dir: vec3<f32>, before: f32, far: f32, pix
             done = true;
             hit.distance = t;
             hit.ground = ground;
-            let shrink = globe.ground_radius / (globe.ground_radius + altitude);
-            let gradient = up - shrink * ground.slope;
-            hit.normal = gradient * inverseSqrt(max(dot(gradient, gradient), 1e-12));
+            hit.normal = globe_normal(globe, at, altitude, ground.slope);
         } else if below >= 0.0 {
             t = clear + (below - clear) * clamp(clear_by / max(clear_by - below_by, 1e-9), 0.1, 0.9);
         } else {
             let full = select(clearance / max(globe.steepest * level - rise, 1e-3), 0.0, early);
+            let safe = max(max(probe.step, full), own);
             done = t >= end;
-            t = min(t + max(max(probe.step, full), least), end);
+            let longer = safe < least && !done;
+            hurried = hurried || longer;
+            let next = t + max(safe, least);
+            // A longer step may pass a crest, but not where the ray comes lowest.
+            let stop = select(end, min(end, lowest), longer && t + own < lowest);
+            t = min(next, stop);
         }
     }
-    if done {
-        // All steps mean that there were too few.
-        hit.steps = min(hit.steps, max_steps - 1);
-    } else if below >= 0.0 || inside {
-        hit.distance = t;
-        hit.ground = globe_at(globe, kind, dir * t, pixel_angle * (before + t));
-        let gradient = globe_up(globe, dir * t) - hit.ground.slope;
-        hit.normal = gradient * inverseSqrt(max(dot(gradient, gradient), 1e-12));
+    if !done {
+        let start = dir * near;
+        let last = dir * clear;
+        let left = globe_altitude(globe, last) - globe_at(globe, kind, last, pixel_angle * (before + clear)).height;
+        let likely = likely_end(globe.ground_radius, globe_altitude(globe, start), dot(globe_up(globe, start), dir), clear - near, left, far - near);
+        // A ray that is clear where it comes lowest rises from there on.
+        hit.distance = select(select(-1.0, near + likely, likely >= 0.0 && clear < lowest), t, below >= 0.0);
+        let at = dir * max(hit.distance, 0.0);
+        hit.ground = globe_at(globe, kind, at, pixel_angle * (before + max(hit.distance, 0.0)));
+        hit.normal = globe_normal(globe, at, globe_altitude(globe, at), hit.ground.slope);
     }
+    // All steps mean that there were too few.
+    hit.steps = select(min(hit.steps, max_steps - 1), max_steps, hurried || !done);
     return hit;
+}
+
+/// How much of a uniform sky's light arrives between the heights around a place of the ground, as `veduta::terrain::sky_share` has it. In each sector the horizon is the highest of six heights, each 2.5 times
+/// as far as the one before it and filtered by a quarter of its distance, the ground's own plane, and the level. `east` and `south` lie along the ground, `slope` goes along them.
+///
+/// internal
+fn globe_sky_share(globe: Globe, kind: i32, origin: vec3<f32>, east: vec3<f32>, south: vec3<f32>, slope: vec2<f32>, footprint: f32, sectors: i32) -> f32 {
+    var sum = 0.0;
+    for (var i = 0; i < sectors; i++) {
+        let turn = 6.283185307 * (f32(i) + 0.5) / f32(sectors);
+        let dir = vec2<f32>(cos(turn), sin(turn));
+        let g = dot(slope, dir);
+        // No sky is below the level.
+        var tangent = max(g, 0.0);
+        var t = 4.0 * footprint;
+        for (var k = 0; k < 6; k++) {
+            let at = origin + t * (dir.x * east + dir.y * south);
+            let rise = (globe_at(globe, kind, at, max(footprint, 0.25 * t)).height - globe_altitude(globe, at)) / t;
+            tangent = max(tangent, rise);
+            t *= 2.5;
+        }
+        let square = 1.0 / (1.0 + tangent * tangent);
+        sum += square - g * (1.570796327 - atan(tangent) - tangent * square);
+    }
+    return select(1.0, max(sum, 0.0) / f32(max(sectors, 1)), sectors > 0);
 }
 
 /// Half the height, in metres across a shadow's border on the ground, over which the clearance of a ray towards a light varies within a pixel of which `dir` is the view and `footprint` the width: the ground's slope

@@ -31,7 +31,7 @@ struct RefinedHit {
 /// domain  most in [0, 1e4] m lin
 /// domain  steps in [0, 4] 1 lin
 /// range   [-1e4, 2e5] 1
-/// error   1 abs of reference::intersect::first_crossing
+/// error   0.2 abs of reference::intersect::first_crossing
 /// outside undefined
 /// source  Newton's method
 fn refined_hit(relief: texture_2d<f32>, field: Field, kind: i32, ground_radius: f32, eye_altitude: f32, origin: vec3<f32>, dir: vec3<f32>, t: f32, pixel_angle: f32, slope: vec2<f32>, most: f32, steps: i32) -> RefinedHit {

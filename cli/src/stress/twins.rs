@@ -103,7 +103,7 @@ pub const ELSEWHERE: &[(&str, &str)] = &[
     ),
     (
         "veduta::terrain::clipmap::baked_height",
-        "valleys_see_less_of_the_sky",
+        "baked_heights_are_patches_between_heights_of_the_field",
     ),
     (
         "veduta::terrain::clipmap::clip_hit",
