@@ -112,14 +112,14 @@ fn frames_that_no_terrain_can_draw_are_refused() {
         ] {
             refused(&good, &broken, 36, name);
         }
-        let mut nowhere = good.clone();
+        let mut nowhere = good;
         nowhere.eye.frac.x = f32::NAN;
         refused(&nowhere, &lights, 36, "eye");
-        let mut blind = good.clone();
+        let mut blind = good;
         blind.exposure = f32::NAN;
         refused(&blind, &lights, 36, "exposure");
         // The targets have reversed depth; this projection has not.
-        let mut turned = good.clone();
+        let mut turned = good;
         turned.projection =
             veduta::glam::camera::rh::proj::directx::perspective(1.0, 1.8, 0.1, 1e5);
         refused(&turned, &lights, 36, "projection");
