@@ -1,5 +1,5 @@
 //! Mountains at half of the pixels a side, joined from frame to frame: what the terrain's bench measures, in a program. Run it with
-//! `cargo run --release --example joined_terrain -- picture.ppm`.
+//! `cargo run --release --example joined_terrain -- picture.ppm 3.3`; the number is the eye's speed in metres a frame, 0 when left out.
 
 use veduta::glam::{DVec3, Vec3};
 use veduta::temporal::Temporal;
@@ -108,8 +108,9 @@ fn main() -> Fallible<()> {
     let path = std::env::args()
         .nth(1)
         .unwrap_or_else(|| "mountains.ppm".to_owned());
+    let speed = std::env::args().nth(2).map_or(Ok(0.0), |s| s.parse())?;
     let size = [256, 144];
-    let radiance = draw(size, 32, 0.0)?;
+    let radiance = draw(size, 32, speed)?;
     let mut file = format!("P6\n{} {}\n255\n", size[0], size[1]).into_bytes();
     for pixel in radiance.chunks_exact(8) {
         for c in [0, 2, 4] {

@@ -352,7 +352,7 @@ impl View {
     /// The rays of a picture of so many pixels across and down.
     ///
     /// # Errors
-    /// As [`View::rays`]; [`Error::OutOfDomain`] for a picture without pixels.
+    /// As [`View::check`] and [`View::rays`]; [`Error::OutOfDomain`] for a picture without pixels.
     pub fn pixels(&self, size: [u32; 2]) -> Result<Pixels, Error> {
         if size.contains(&0) {
             return Err(Error::OutOfDomain {
@@ -361,6 +361,7 @@ impl View {
                 domain: "at least 1x1".to_owned(),
             });
         }
+        self.check()?;
         let [middle, right, up] = self.rays()?.map(|v| v.as_dvec3());
         let p = &self.projection;
         Ok(Pixels {
@@ -370,7 +371,8 @@ impl View {
             forward: self
                 .world_from_view
                 .transform_vector3(Vec3::NEG_Z)
-                .as_dvec3(),
+                .as_dvec3()
+                .normalize(),
             size: size.map(f64::from),
             depth: [p.z_axis.z, p.w_axis.z, p.z_axis.w, p.w_axis.w].map(f64::from),
         })
@@ -392,7 +394,8 @@ impl Pixels {
         2.0 * self.up.length() / self.size[1]
     }
 
-    /// Distance from the eye (m) along the ray through a place of the picture, from what the depth buffer has there, by whichever depth the view's projection has; infinite where that is the depth of nothing or behind the eye.
+    /// Distance from the eye (m) along the ray through a place of the picture, from what the depth buffer has there, by whichever depth the view's projection has; infinite where that is behind the eye or at
+    /// infinity. A projection with a far plane cleared to it says the distance of that plane.
     pub fn distance(&self, at: [f64; 2], depth: f32) -> f64 {
         let d = f64::from(depth);
         let [zz, zw, wz, ww] = self.depth;

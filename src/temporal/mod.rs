@@ -31,7 +31,7 @@ pub struct TemporalOptions {
     pub sharp: bool,
     /// Whether nothing moves but the eye, and nothing comes or goes: a history is then left where what stood there and what is seen move apart by more than a quarter of a pixel in a
     /// frame, instead of where it stood at another distance than the samples around. Samples that miss what a pixel shows do not end its history, and nothing trails behind edges that the
-    /// eye passes; but things that vanish stay, and so this is not for hosts with meshes that move.
+    /// eye passes faster; but things that vanish stay, and so this is not for hosts with meshes that move.
     pub fixed: bool,
     /// Whether the host leaves what shows nothing transparent: where the depth is that of nothing and alpha is 0 all around, no frames are joined, and the result is 0.
     /// Leave it off where something is drawn without depth or alpha: clouds over a transparent target leave its alpha at 0, so that squares which show nothing but clouds would be dropped.

@@ -68,7 +68,7 @@ impl Land {
             return Err(Error::OutOfDomain {
                 name: "land.field.domain".to_owned(),
                 value: format!("{:?}", self.field.domain),
-                domain: "Sphere; HeightField::prepare takes a plane".to_owned(),
+                domain: "Sphere; Land::prepare takes a plane".to_owned(),
             });
         }
         let mut bounds = self.field.bounds()?;

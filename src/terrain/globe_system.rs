@@ -15,9 +15,6 @@ use crate::programs::blocks::{
 use crate::settings::Settings;
 use crate::view::View;
 
-/// Tiles of the picture: 16 across and 12 down.
-const TILES: u32 = 16 * 12;
-
 /// Zenith cosines of the sun for which a ball has lights.
 pub(super) const LIGHTS: usize = 32;
 
@@ -273,7 +270,7 @@ impl GlobeTerrain {
         }
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.group, &[]);
-        pass.draw(0..TILES * 6, 0..1);
+        pass.draw(0..6, 0..1);
         Work {
             draws: 1,
             ..Work::default()

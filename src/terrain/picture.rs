@@ -129,7 +129,8 @@ fn shaded(
         let mu = elevation.sin();
         let mut horizon = f64::NEG_INFINITY;
         let mut d = footprint;
-        while d < far && altitude_along(altitude, radius, mu, d) < top + 0.02 * d {
+        while d < far && altitude_along(altitude, radius, mu, d) < top + (1.1 * limb).max(0.02) * d
+        {
             let there = [at[0] + ahead.x * d, at[1] + ahead.y * d];
             let width = footprint.max(0.01 * d);
             let g = field.ground_from(place, there, width).height;

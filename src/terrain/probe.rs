@@ -33,10 +33,10 @@ impl Prepared<f32> {
     }
 }
 
-/// The field at positions, filtered by a footprint (m), as the device computes it. Submits and waits. Compiles what it needs at each call: [`TerrainQuery::heights`] does not.
+/// The field at positions without any sea, filtered by a footprint (m), as the device computes it. Submits and waits. Compiles what it needs at each call: [`TerrainQuery::heights`] does not.
 ///
 /// # Errors
-/// As [`HeightField::check`]; [`Error::OutOfDomain`] for a footprint that is not finite or below 0 and for positions that are not finite; the faults of [`ProgramSet::get`] and of making
+/// As [`HeightField::check`]; [`Error::OutOfDomain`] for a footprint that is not finite or below 0 and for positions that are not finite, and for a program's own function where none is plugged in; the faults of [`ProgramSet::get`] and of making
 /// the pipeline; [`Error::Device`].
 pub fn heights(
     gpu: &Gpu,

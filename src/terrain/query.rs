@@ -164,11 +164,11 @@ impl TerrainQuery {
         self.baked_from = rays.max(1);
     }
 
-    /// The field at positions, filtered by a footprint (m). Submits and waits.
+    /// The land at positions, the field with its sea, filtered by a footprint (m). Submits and waits.
     ///
     /// # Errors
-    /// [`Error::OutOfDomain`] for a footprint that is not finite or below 0, for positions that are not finite, and over a ball, where [`TerrainQuery::globe_heights`] answers; the faults of
-    /// [`ProgramSet::get`] and of making the pipeline; [`Error::Device`].
+    /// [`Error::OutOfDomain`] for a footprint that is not finite or below 0, for positions that are not finite, over a ball, where [`TerrainQuery::globe_heights`] answers, and for a program's own function where none is plugged
+    /// in; the faults of [`ProgramSet::get`] and of making the pipeline; [`Error::Device`].
     pub fn heights(
         &mut self,
         positions: &[WorldPos],
@@ -252,7 +252,7 @@ impl TerrainQuery {
     /// shows them clear. Over a ball each ray starts where it comes below the highest ground, which is found in `f64`.
     ///
     /// # Errors
-    /// As [`TerrainRay::check`], with the ray's index; [`Error::OutOfDomain`] for an angle that is not above 0; the faults of [`ProgramSet::get`] and of making pipelines; [`Error::Device`].
+    /// As [`TerrainRay::check`], with the ray's index; [`Error::OutOfDomain`] for an angle that is not above 0, and for a program's own function where none is plugged in; the faults of [`ProgramSet::get`] and of making pipelines; [`Error::Device`].
     pub fn ray_hits(
         &mut self,
         rays: &[TerrainRay],

@@ -27,7 +27,7 @@ pub struct TerrainHit {
     pub normal: [f64; 3],
     /// Height of the field under the hit (m).
     pub height: f64,
-    /// Whether the ray ran out of steps, so that the answer is what is most likely.
+    /// Whether the ray ran out of steps, so that the answer is what is most likely; over a ball also whether it took longer steps than are sure, though its hit is bracketed.
     pub capped: bool,
 }
 

@@ -51,7 +51,7 @@ impl Terrain {
     /// Builds pipelines and makes room for heights.
     ///
     /// # Errors
-    /// [`Error::OutOfDomain`] for targets that it cannot draw into or that have no depth, and for options; the faults of [`Settings::resolve`], the clipmap and
+    /// [`Error::OutOfDomain`] for targets that it cannot draw into or that have no depth, for options, and for a program's own function where none is plugged in; the faults of [`Settings::resolve`], the clipmap and
     /// [`Land::globe`].
     ///
     /// [`Settings::resolve`]: crate::Settings::resolve
@@ -155,7 +155,7 @@ impl Terrain {
         }
     }
 
-    /// Draws into the host's pass: tiles of the picture, without those that show no ground. A view that cannot show any draws nothing.
+    /// Draws into the host's pass: over a plane one triangle below the skyline, over a ball the rectangle that can show it. A view that cannot show any draws nothing.
     pub fn draw_opaque(&self, pass: &mut wgpu::RenderPass<'_>) -> Work {
         match &self.ground {
             Ground::Plane(plane) => plane.draw_opaque(pass),

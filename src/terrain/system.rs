@@ -75,8 +75,8 @@ pub struct TerrainOptions {
     /// Texels of a side of each level of baked heights: 128, 256, 512 or 1024. A texel is about as wide as a pixel where it is used when this is 3.5 over the angle of a pixel. 0 leaves it to the
     /// preset's CLIP_TEXELS, 512. Where they are finer than these, rays take as many more steps. Nothing comes of it over a ball, where nothing is baked.
     pub texels: u32,
-    /// Whether rays look for the field itself wherever they come near what is baked, and towards the sun over the field, too: pictures are those of `f64` to 60 dB also of ridges, at a multiple of the
-    /// time. Nothing comes of it over a ball, where nothing is baked.
+    /// Whether rays look for the field itself wherever they come near what is baked, and towards the sun over the field, too, at a multiple of the time: with a preset that refines hits and has all of
+    /// the rock (`high`), pictures of ridges are those of `f64` to 60 dB, too (`docs/terrain.md`). `sky_sectors` are looked for over baked heights all the same. Nothing comes of it over a ball, where nothing is baked.
     pub exact: bool,
     /// Whether a layer of clouds shades the ground, which [`Terrain::set_cloud_shadow`](super::Terrain::set_cloud_shadow) tells. Nothing comes of it over a ball.
     pub cloud_shadows: bool,

@@ -15,13 +15,16 @@ const FAR: f64 = 50_000.0;
 /// The preset `low` with sectors of so many texels.
 fn widened(width: i64) -> ProgramSet {
     let mut set = veduta::programs().clone();
+    let mut changed = 0;
     for preset in set.presets.to_mut().iter_mut().filter(|p| p.name == "low") {
         for (key, value) in preset.values.to_mut() {
             if key == "CLIP_WIDTH" {
                 *value = Value::Int(width);
+                changed += 1;
             }
         }
     }
+    assert_eq!(changed, 1, "`low` says how wide sectors are");
     set
 }
 

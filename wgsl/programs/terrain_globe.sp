@@ -60,16 +60,8 @@ fn ray_through(clip: vec2<f32>) -> vec3<f32> {
     return draw_view.ray_middle + clip.x * draw_view.ray_right + clip.y * draw_view.ray_up;
 }
 
-// Tiles of the picture, 16 across and 12 down, two triangles each; those that lie outside of the ball have no size.
-@vertex
-fn cover(@builtin(vertex_index) index: u32) -> Corner {
-    let tile = index / 6u;
-    let corner = index % 6u;
-    let k = select(select(3u, corner % 3u, corner == 4u), select(corner, 2u, corner == 3u), corner < 4u);
-    let size = vec2<f32>(0.125, 0.16666667);
-    let place = vec2<f32>(f32(tile % 16u), f32(tile / 16u));
-    let clip = (place + vec2<f32>(f32(k & 1u), f32(k >> 1u))) * size - 1.0;
-    // The cone about the tile, and that about the ball: they meet unless their axes are farther apart than both angles.
+// Whether the ball may be seen in one of 16 x 12 tiles of the picture: the cone about the tile and that about the ball meet unless their axes are farther apart than both angles.
+fn in_tile(place: vec2<f32>, size: vec2<f32>) -> bool {
     let middle = normalize(ray_through((place + 0.5) * size - 1.0));
     var least = 1.0;
     for (var j = 0; j < 4; j++) {
@@ -78,7 +70,25 @@ fn cover(@builtin(vertex_index) index: u32) -> Corner {
     }
     let down = dot(middle, -globe.up);
     let apart = acos(clamp(down, -1.0, 1.0)) - acos(clamp(least, -1.0, 1.0)) - acos(clamp(draw_view.rim_cosine, -1.0, 1.0));
-    return Corner(vec4<f32>(select(vec2<f32>(0.0), clip, apart < 2e-3), 0.5, 1.0), ray_through(clip));
+    return apart < 2e-3;
+}
+
+// The rectangle around all tiles of the picture in which the ball may be seen, as two triangles: more of them would have blocks of pixels along their borders shaded twice.
+@vertex
+fn cover(@builtin(vertex_index) index: u32) -> Corner {
+    let size = vec2<f32>(0.125, 0.16666667);
+    var low = vec2<f32>(1e3);
+    var high = vec2<f32>(-1e3);
+    for (var tile = 0; tile < 192; tile++) {
+        let place = vec2<f32>(f32(tile % 16), f32(tile / 16));
+        let seen = in_tile(place, size);
+        low = select(low, min(low, place), seen);
+        high = select(high, max(high, place + 1.0), seen);
+    }
+    let k = select(index, 6u - index, index > 3u);
+    let corner = select(low, high, vec2<bool>((k & 1u) == 1u, (k >> 1u) == 1u));
+    let clip = select(vec2<f32>(0.0), corner * size - 1.0, low.x < high.x);
+    return Corner(vec4<f32>(clip, 0.5, 1.0), ray_through(clip));
 }
     }#
 }#

@@ -74,6 +74,7 @@ const EVERY_CREST: f32 = 0.4;
 
 /// Where a ray from the eye meets the field: over baked heights with so many last steps on the field. Where texels are wider than footprints these do not know the field's crests: there, within the
 /// margin of what is baked, the field itself is looked for in steps of half a footprint or of the clearance over the slopes that are usual, and bracketed; at most `search_steps` times.
+/// A margin of at least 0.4 texels looks for all crests that are a twentieth of a footprint wide: in steps of that, or of the clearance over a slope of 4.
 ///
 /// domain  kind in [0, 7] 1 lin
 /// domain  dir in [-1, 1] 1 lin
@@ -81,7 +82,7 @@ const EVERY_CREST: f32 = 0.4;
 /// domain  pixel_angle in [1e-5, 0.1] 1 log
 /// domain  max_steps in [0, 10000] 1 lin
 /// domain  refine_steps in [0, 4] 1 lin
-/// domain  search_steps in [0, 1000] 1 lin
+/// domain  search_steps in [0, 10000] 1 lin
 /// range   [-1e6, 1e6] 1
 /// error   1 abs of reference::intersect::first_crossing
 /// outside undefined
@@ -192,7 +193,7 @@ fn field_sun_share(relief: texture_2d<f32>, field: Field, kind: i32, ground_radi
     for (var i = 0; i < max_steps; i++) {
         let q = d * (d + 2.0 * radius * to_sun.y);
         let above = q / (radius + sqrt(max(radius * radius + q, 0.0)));
-        if d >= far || altitude + above >= highest + 0.02 * d {
+        if d >= far || altitude + above >= highest + max(0.02, 1.1 * limb) * d {
             break;
         }
         let width = max(footprint, 0.01 * d);
@@ -200,6 +201,9 @@ fn field_sun_share(relief: texture_2d<f32>, field: Field, kind: i32, ground_radi
         horizon = max(horizon, rise / d - 0.5 * d / radius);
         d += 0.5 * width;
     }
-    let x = clamp((to_sun.y - horizon * level) * inverseSqrt(1.0 + horizon * horizon) / limb, -1.0, 1.0);
+    let above = to_sun.y - horizon * level;
+    let apart = above * inverseSqrt(1.0 + horizon * horizon) / limb;
+    // More than a right angle above the horizon, of which the sine tells nothing.
+    let x = select(clamp(apart, -1.0, 1.0), 1.0, above > 0.0 && level + horizon * to_sun.y < 0.0);
     return 0.5 + x * (0.75 - 0.25 * x * x);
 }

@@ -565,6 +565,18 @@ pub fn hits(
     ))
 }
 
+/// Refuses names of presets that are not measured.
+fn check_names(of: &[String], known: &[&str]) -> Result<(), CliError> {
+    match of.iter().find(|o| !known.contains(&o.as_str())) {
+        Some(other) => Err(CliError::argument(
+            "--of",
+            other.clone(),
+            format!("of {}", known.join(", ")),
+        )),
+        None => Ok(()),
+    }
+}
+
 /// Frames of a round of costs, standing and flying.
 const PACED: usize = 4;
 
@@ -579,6 +591,7 @@ pub fn costs(
     of: &[String],
     progress: &mut dyn FnMut(&str),
 ) -> Result<String, CliError> {
+    check_names(of, &PRESETS)?;
     let named = |p: &&str| of.is_empty() || of.iter().any(|o| o == p);
     let presets: Vec<&str> = PRESETS.into_iter().filter(named).collect();
     let columns = [
@@ -940,6 +953,7 @@ impl Changes {
 
 /// A flight with V01's eye and sun, at half the size, of `thesis` and the presets, or of those that are named.
 fn flicker(bench: &Bench, frames: usize, of: &[String]) -> Result<Flicker, CliError> {
+    check_names(of, &["thesis", PRESETS[0], PRESETS[1]])?;
     let named = |p: &&str| of.is_empty() || of.iter().any(|o| o == p);
     let small = Size {
         width: bench.size.width / 2,

@@ -405,6 +405,8 @@ pub fn run(args: &BenchArgs) -> Result<(), CliError> {
                 };
                 let title = if args.hits {
                     "Where the terrain's rays end"
+                } else if args.changes {
+                    "How terrain changes in a flight"
                 } else {
                     "What whole frames of terrain cost"
                 };
