@@ -15,6 +15,7 @@ const SHIFT: [f64; 2] = [0.171875, 0.390625];
 
 impl<T: Real> Place<T> {
     /// A cell with any fraction.
+    #[inline]
     pub fn new(cell: [i32; 2], frac: [T; 2]) -> Place<T> {
         let whole = frac.map(T::whole);
         Place {
@@ -24,6 +25,7 @@ impl<T: Real> Place<T> {
     }
 
     /// The same position on a lattice twice as fine.
+    #[inline]
     pub fn finer(self) -> Place<T> {
         let over = self.frac.map(|f| f >= T::of(0.5));
         Place {
@@ -39,6 +41,7 @@ impl<T: Real> Place<T> {
     }
 
     /// Shifted as octave `i` is.
+    #[inline]
     pub fn shifted(self, i: i32) -> Place<T> {
         if i == 0 {
             return self;
@@ -55,6 +58,7 @@ impl<T: Real> Place<T> {
 }
 
 /// The seed of octave `i`.
+#[inline]
 pub fn octave_seed(seed: u32, i: i32) -> u32 {
     seed.wrapping_add(i.cast_unsigned().wrapping_mul(0x9e37_79b9))
 }
@@ -62,16 +66,19 @@ pub fn octave_seed(seed: u32, i: i32) -> u32 {
 const MULTIPLIER: u32 = 747_796_405;
 const INCREMENT: u32 = 1_013_904_223;
 
+#[inline]
 fn stir(word: u32) -> u32 {
     (word ^ (word >> 16)).wrapping_mul(MULTIPLIER)
 }
 
+#[inline]
 fn finish(word: u32, factor: u32) -> u32 {
     let product = (word ^ (word >> 15)).wrapping_mul(factor | 1);
     product ^ (product >> 15)
 }
 
 /// Two random words of a lattice point.
+#[inline]
 pub fn words(cell: [i32; 2], seed: u32) -> [u32; 2] {
     let w = cell.map(|c| {
         c.cast_unsigned()
@@ -117,12 +124,14 @@ pub fn gradient_noise<T: Real>(p: Place<T>, seed: u32) -> [T; 3] {
     ]
 }
 
+#[inline]
 pub(super) fn fade<T: Real>(t: T) -> T {
     let s = t - T::of(0.5);
     let w = T::of(0.25) - s * s;
     (s * w * (w * T::of(6.0) + T::of(2.0)) + t).most(T::of(0.0))
 }
 
+#[inline]
 pub(super) fn fade_slope<T: Real>(t: T) -> T {
     let s = t - T::of(0.5);
     let q = s * s;
@@ -130,6 +139,7 @@ pub(super) fn fade_slope<T: Real>(t: T) -> T {
 }
 
 /// Profile of a crater, and its slope over the square of the distance.
+#[inline]
 fn crater_profile<T: Real>(x: T, square: T) -> [T; 2] {
     let (zero, one) = (T::of(0.0), T::of(1.0));
     let hollow = (one - square).most(zero);

@@ -16,6 +16,7 @@ const SHIFT: [f64; 3] = [0.171875, 0.203125, 0.390625];
 
 impl<T: Real> Place3d<T> {
     /// A cell with any fraction.
+    #[inline]
     pub fn new(cell: [i32; 3], frac: [T; 3]) -> Place3d<T> {
         let whole = frac.map(T::whole);
         Place3d {
@@ -25,6 +26,7 @@ impl<T: Real> Place3d<T> {
     }
 
     /// The same position on a lattice twice as fine.
+    #[inline]
     pub fn finer(self) -> Place3d<T> {
         let over = self.frac.map(|f| f >= T::of(0.5));
         Place3d {
@@ -40,6 +42,7 @@ impl<T: Real> Place3d<T> {
     }
 
     /// Shifted as octave `i` is.
+    #[inline]
     pub fn shifted(self, i: i32) -> Place3d<T> {
         if i == 0 {
             return self;
@@ -61,6 +64,7 @@ const SEED: u32 = 2_654_435_761;
 const SPREAD: [u32; 3] = [MULTIPLIER, 2_654_435_769, 2_246_822_519];
 
 /// The random word of a lattice point that its vector is made of.
+#[inline]
 fn word(cell: [i32; 3], seed: u32) -> u32 {
     let start = [START, START, seed.wrapping_mul(SEED).wrapping_add(START)];
     let [x, y, z]: [u32; 3] = std::array::from_fn(|k| {
@@ -74,11 +78,13 @@ fn word(cell: [i32; 3], seed: u32) -> u32 {
     (x.wrapping_mul(MULTIPLIER) ^ row).wrapping_mul(row | 1)
 }
 
+#[inline]
 fn stir(word: u32) -> u32 {
     (word ^ (word >> 16)).wrapping_mul(MULTIPLIER)
 }
 
 /// Three random words of a lattice point.
+#[inline]
 fn words(cell: [i32; 3], seed: u32) -> [u32; 3] {
     let [x, mut y, mut z] = cell.map(|c| {
         c.cast_unsigned()
@@ -96,6 +102,7 @@ fn words(cell: [i32; 3], seed: u32) -> [u32; 3] {
 }
 
 /// One of 24 vectors of the length 1.3847.
+#[inline]
 fn vector<T: Real>(word: u32) -> [T; 3] {
     let (long, short) = T::sides();
     let sides = if word & 0x10_0000 != 0 {
@@ -115,6 +122,7 @@ fn vector<T: Real>(word: u32) -> [T; 3] {
     }
 }
 
+#[inline]
 fn dot<T: Real>(a: [T; 3], b: [T; 3]) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
@@ -165,6 +173,7 @@ pub fn gradient_noise_3d<T: Real>(p: Place3d<T>, seed: u32) -> [T; 4] {
 }
 
 /// Profile of a crater, and its slope over the square of the distance.
+#[inline]
 fn profile<T: Real>(x: T, square: T) -> [T; 2] {
     let (zero, one) = (T::of(0.0), T::of(1.0));
     let hollow = (one - square).most(zero);
@@ -178,6 +187,7 @@ fn profile<T: Real>(x: T, square: T) -> [T; 2] {
 }
 
 /// Craters of one lattice on a ball of a radius in cells: value and slope per cell.
+#[inline]
 pub fn craters_3d<T: Real>(p: Place3d<T>, up: [T; 3], radius: T, share: T, seed: u32) -> [T; 4] {
     let [zero, one, two] = [0.0, 1.0, 2.0].map(T::of);
     let mut sum = [zero; 4];

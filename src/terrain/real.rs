@@ -32,43 +32,53 @@ pub trait Real:
     fn sides() -> (Self, Self);
 
     /// The greater of two.
+    #[inline]
     fn most(self, other: Self) -> Self {
         if self > other { self } else { other }
     }
 
     /// The lesser of two.
+    #[inline]
     fn least(self, other: Self) -> Self {
         if self < other { self } else { other }
     }
 
     /// The size.
+    #[inline]
     fn size(self) -> Self {
         if self < Self::of(0.0) { -self } else { self }
     }
 }
 
 impl Real for f32 {
+    #[inline]
     fn of(value: f64) -> f32 {
         value as f32
     }
+    #[inline]
     fn wide(self) -> f64 {
         f64::from(self)
     }
+    #[inline]
     fn root(self) -> f32 {
         self.sqrt()
     }
+    #[inline]
     fn parts(self) -> (f32, f32) {
         let high = f32::from_bits(self.to_bits() & 0xffff_8000);
         (high, self - high)
     }
+    #[inline]
     fn whole(self) -> f32 {
         self.floor()
     }
+    #[inline]
     fn sides() -> (f32, f32) {
         (f32::from_bits(0x3f96_c54d), f32::from_bits(0x3f3a_5ce4))
     }
     // The polynomial and the bit operations of the module, in their order.
     #[allow(clippy::excessive_precision)]
+    #[inline]
     fn vector(word: u32) -> [f32; 2] {
         let u = f32::from_bits((word >> 9) | 0x3f80_0000) - 1.0;
         let q = u * u;
@@ -89,26 +99,33 @@ impl Real for f32 {
 }
 
 impl Real for f64 {
+    #[inline]
     fn of(value: f64) -> f64 {
         value
     }
+    #[inline]
     fn wide(self) -> f64 {
         self
     }
+    #[inline]
     fn root(self) -> f64 {
         self.sqrt()
     }
+    #[inline]
     fn parts(self) -> (f64, f64) {
         (self, 0.0)
     }
+    #[inline]
     fn whole(self) -> f64 {
         self.floor()
     }
+    #[inline]
     fn sides() -> (f64, f64) {
         let golden = (1.0 + 5_f64.sqrt()) / 2.0;
         let short = 1.3847 / (1.0 + golden * golden).sqrt();
         (golden * short, short)
     }
+    #[inline]
     fn vector(word: u32) -> [f64; 2] {
         let angle = std::f64::consts::FRAC_PI_4 * f64::from(word >> 9) / f64::from(1_u32 << 23);
         let (sine, cosine) = angle.sin_cos();
