@@ -24,21 +24,43 @@ pub fn rays(
     let origin = foot.moved_by([0.0, ground + height, 0.0].into());
     let mut view = veduta::View::default();
     view.look(0.3, f64::to_radians(pitch), 60_f32.to_radians(), 16.0 / 9.0);
-    let [middle, right, up] = view.rays().unwrap().map(|v| v.as_dvec3());
-    let columns = rows * 16 / 9;
-    let mut rays = Vec::new();
-    for y in 0..rows {
-        for x in 0..columns {
-            let at = |i: usize, n: usize| 2.0 * (i as f64 + 0.5) / n as f64 - 1.0;
-            let dir = (middle + right * at(x, columns) - up * at(y, rows)).normalize();
-            rays.push(TerrainRay {
-                origin,
-                dir: dir.to_array(),
-                far: 50_000.0,
-            });
-        }
-    }
-    (rays, (2.0 * up.length() / rows as f64) as f32)
+    view.eye = origin;
+    let (rays, angle) = picture_rays(&view, [rows * 16 / 9, rows], 50_000.0);
+    (rays, angle as f32)
+}
+
+/// The rays through the middles of a picture's pixels, row by row from the top, and the angle of a pixel.
+pub fn picture_rays(
+    view: &veduta::View,
+    [columns, rows]: [usize; 2],
+    far: f64,
+) -> (Vec<TerrainRay>, f64) {
+    let pixels = view.pixels([columns as u32, rows as u32]).unwrap();
+    let rays = (0..columns * rows)
+        .map(|i| TerrainRay {
+            origin: view.eye,
+            dir: pixels
+                .direction([i % columns, i / columns].map(|k| k as f64 + 0.5))
+                .to_array(),
+            far,
+        })
+        .collect();
+    (rays, pixels.angle())
+}
+
+/// The mountains of `thesis` to 50 km, as `high` draws them.
+fn thesis_terrain() -> veduta::terrain::Terrain {
+    let targets = veduta::Targets {
+        color_format: wgpu::TextureFormat::Rgba32Float,
+        depth_format: Some(wgpu::TextureFormat::Depth32Float),
+        ..Default::default()
+    };
+    let options = veduta::terrain::TerrainOptions {
+        land: Land::named("thesis").unwrap(),
+        far: 50_000.0,
+        ..Default::default()
+    };
+    veduta::terrain::Terrain::new(&gpu().device, veduta::programs(), &targets, &options).unwrap()
 }
 
 /// Judges `clip_hit`, and `refined_hit` after it.
@@ -189,37 +211,20 @@ fn through_a_long_lens(steps: i64, search: i64) -> (Land, Vec<TerrainRay>, Vec<T
         .unwrap();
     gpu.queue.submit([encoder.finish()]);
     let (_, depths, _) = drawn(&terrain, columns, rows, 0.0);
-    let [middle, right, up] = view.rays().unwrap().map(|v| v.as_dvec3());
-    let forward = view
-        .world_from_view
-        .transform_vector3(veduta::glam::Vec3::NEG_Z)
-        .as_dvec3();
-    let [from, scale] = [view.projection.w_axis.z, view.projection.z_axis.z].map(f64::from);
-    let at = |k: usize, n: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
+    let pixels = view.pixels([columns as u32, rows as u32]).unwrap();
+    let (all, angle) = picture_rays(&view, [columns, rows], 50_000.0);
     // The third of the picture around the skyline.
     let (mut rays, mut found) = (Vec::new(), Vec::new());
     for (i, depth) in depths.iter().enumerate() {
         if i / columns < rows / 3 || i / columns >= 2 * rows / 3 {
             continue;
         }
-        let dir =
-            (middle + right * at(i % columns, columns) - up * at(i / columns, rows)).normalize();
-        rays.push(TerrainRay {
-            origin: view.eye,
-            dir: dir.to_array(),
-            far: 50_000.0,
-        });
-        let depth = f64::from(*depth);
+        rays.push(all[i]);
         found.push(TerrainHit {
-            distance: if depth > 0.0 {
-                from / (depth + scale) / dir.dot(forward)
-            } else {
-                f64::INFINITY
-            },
+            distance: pixels.distance([i % columns, i / columns].map(|k| k as f64 + 0.5), *depth),
             ..TerrainHit::MISS
         });
     }
-    let angle = 2.0 * up.length() / rows as f64;
     (land, rays, found, angle)
 }
 
@@ -297,23 +302,14 @@ fn rays_that_run_out_of_steps_have_come_some_way() {
 
 #[test]
 fn sky_is_not_drawn_and_no_ground_is_lost_with_it() {
+    use veduta::View;
     use veduta::glam::Vec3;
-    use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
-    use veduta::{Targets, View};
+    use veduta::terrain::TerrainLights;
     let gpu = gpu();
     let (rows, columns) = (36, 64);
-    let targets = Targets {
-        color_format: wgpu::TextureFormat::Rgba32Float,
-        depth_format: Some(wgpu::TextureFormat::Depth32Float),
-        ..Default::default()
-    };
-    let options = TerrainOptions {
-        land: Land::named("thesis").unwrap(),
-        far: 50_000.0,
-        ..Default::default()
-    };
-    let top = options.land.field.bounds().unwrap().maximum;
-    let mut terrain = Terrain::new(&gpu.device, veduta::programs(), &targets, &options).unwrap();
+    let land = Land::named("thesis").unwrap();
+    let top = land.field.bounds().unwrap().maximum;
+    let mut terrain = thesis_terrain();
     let mut draw = |eye: WorldPos, pitch: f64| {
         let mut view = View {
             eye,
@@ -330,9 +326,9 @@ fn sky_is_not_drawn_and_no_ground_is_lost_with_it() {
         (depths, work.draws)
     };
     for (height, pitch) in [(2.0, 5.0), (50.0, 20.0), (300.0, 0.0), (300.0, 15.0)] {
-        let (rays, angle) = rays(&options.land, rows, height, pitch, [13_500.0, -14_700.0]);
+        let (rays, angle) = rays(&land, rows, height, pitch, [13_500.0, -14_700.0]);
         let path = RayPath::Fast;
-        let found = ray_hits(gpu, veduta::programs(), &options.land, &rays, angle, path).unwrap();
+        let found = ray_hits(gpu, veduta::programs(), &land, &rays, angle, path).unwrap();
         let (depths, draws) = draw(rays[0].origin, pitch);
         let hits = found.iter().filter(|h| h.distance.is_finite()).count();
         let apart =
@@ -373,23 +369,14 @@ fn sky_is_not_drawn_and_no_ground_is_lost_with_it() {
 
 #[test]
 fn no_ground_is_lost_however_the_picture_is_turned() {
+    use veduta::View;
     use veduta::glam::{Mat4, Vec3};
-    use veduta::terrain::{Terrain, TerrainLights, TerrainOptions};
-    use veduta::{Targets, View};
+    use veduta::terrain::TerrainLights;
     let gpu = gpu();
     let (rows, columns) = (36, 64);
-    let targets = Targets {
-        color_format: wgpu::TextureFormat::Rgba32Float,
-        depth_format: Some(wgpu::TextureFormat::Depth32Float),
-        ..Default::default()
-    };
-    let options = TerrainOptions {
-        land: Land::named("thesis").unwrap(),
-        far: 50_000.0,
-        ..Default::default()
-    };
-    let mut terrain = Terrain::new(&gpu.device, veduta::programs(), &targets, &options).unwrap();
-    let (level, _) = rays(&options.land, rows, 300.0, 0.0, [13_500.0, -14_700.0]);
+    let land = Land::named("thesis").unwrap();
+    let mut terrain = thesis_terrain();
+    let (level, _) = rays(&land, rows, 300.0, 0.0, [13_500.0, -14_700.0]);
     let mut part_of_the_sky = 0;
     for (roll, pitch) in [
         (0, -35),
@@ -415,21 +402,9 @@ fn no_ground_is_lost_however_the_picture_is_turned() {
             .unwrap();
         gpu.queue.submit([encoder.finish()]);
         let (_, depths, _) = drawn(&terrain, columns, rows, 0.0);
-        let [middle, right, up] = view.rays().unwrap().map(|v| v.as_dvec3());
-        let at = |i: usize, n: usize| 2.0 * (i as f64 + 0.5) / n as f64 - 1.0;
-        let seen: Vec<TerrainRay> = (0..rows * columns)
-            .map(|i| {
-                let (x, y) = (i % columns, i / columns);
-                let dir = middle + right * at(x, columns) - up * at(y, rows);
-                TerrainRay {
-                    dir: dir.normalize().to_array(),
-                    ..level[0]
-                }
-            })
-            .collect();
-        let angle = (2.0 * up.length() / rows as f64) as f32;
+        let (seen, angle) = picture_rays(&view, [columns, rows], 50_000.0);
         let path = RayPath::Fast;
-        let found = ray_hits(gpu, veduta::programs(), &options.land, &seen, angle, path).unwrap();
+        let found = ray_hits(gpu, veduta::programs(), &land, &seen, angle as f32, path).unwrap();
         let hits = found.iter().filter(|h| h.distance.is_finite()).count();
         let lost = found.iter().zip(&depths);
         let lost = lost

@@ -4,7 +4,7 @@ use veduta::WorldPos;
 use veduta::glam::{DVec3, Vec3};
 use veduta::terrain::{
     Kind, Land, RayPath, Sea, Terrain, TerrainHit, TerrainLights, TerrainOptions, TerrainQuery,
-    TerrainRay, hit_errors, land_picture,
+    hit_errors, land_picture,
 };
 
 use veduta::reference::field::height_spread;
@@ -76,19 +76,7 @@ fn rays_meet_the_sea_and_its_shores() {
             0.7,
             16.0 / 9.0,
         );
-        let [middle, right, up] = view.rays().unwrap().map(|v| v.as_dvec3());
-        let angle = 2.0 * up.length() / rows as f64;
-        let rays: Vec<TerrainRay> = (0..columns * rows)
-            .map(|i| {
-                let at = |k: usize, n: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
-                let ray = middle + right * at(i % columns, columns) - up * at(i / columns, rows);
-                TerrainRay {
-                    origin: view.eye,
-                    dir: ray.normalize().to_array(),
-                    far: 60_000.0,
-                }
-            })
-            .collect();
+        let (rays, angle) = crate::land::picture_rays(&view, [columns, rows], 60_000.0);
         let mut query = TerrainQuery::new(gpu(), veduta::programs(), &land).unwrap();
         for (path, across) in [(RayPath::Textbook, 1.0), (RayPath::Fast, 0.5)] {
             query.set_baked_from(1);
